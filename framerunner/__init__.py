@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from scenarios.random_scenarios import Level, load_level, random_scenario
     from scenarios.result import FlightResult
     from vision.calibration.model import Calibration
-    from vision.detectors import Detector, DetectorMaker, new_detector
-    from vision.types import Detection, Detections
+    from vision.detectors import Detector, DetectorMaker, SightingMaker, new_detector
+    from vision.types import Detection, Detections, GateCorner, GatePose, GateSighting
 
     __version__: str
 
@@ -33,10 +33,14 @@ _MODULES = {
     "DetectorMaker": "vision.detectors",
     "Evaluation": "framerunner.api",
     "FlightResult": "scenarios.result",
+    "GateCorner": "vision.types",
+    "GatePose": "vision.types",
+    "GateSighting": "vision.types",
     "Level": "scenarios.random_scenarios",
     "Mission": "offboard.mission",
     "Pilot": "offboard.pilot",
     "Scenario": "scenarios.models",
+    "SightingMaker": "vision.detectors",
     "Simulator": "framerunner.simulator",
     "TrueState": "scenarios.models",
     "UserError": "framerunner.errors",
@@ -57,10 +61,14 @@ __all__ = [
     "DetectorMaker",
     "Evaluation",
     "FlightResult",
+    "GateCorner",
+    "GatePose",
+    "GateSighting",
     "Level",
     "Mission",
     "Pilot",
     "Scenario",
+    "SightingMaker",
     "Simulator",
     "TrueState",
     "UserError",

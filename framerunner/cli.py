@@ -24,6 +24,7 @@ _COMMANDS = {
     "fly": "fly:fly",
     "camera": "camera:app",
     "mocap": "mocap:mocap",
+    "vio": "vio:vio",
     "doctor": "doctor:doctor",
     "preflight": "preflight:preflight",
     "evaluate": "evaluate:evaluate",

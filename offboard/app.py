@@ -12,7 +12,7 @@ from typing import Literal
 
 from framerunner.wire.mission_report import TransitionTaken
 from offboard.abort import FlightAbort
-from offboard.drone import Drone, DroneError, DroneState, LimitedCommand, VelocityFluCommand
+from offboard.drone import Drone, DroneError, DroneState, LimitedCommand, PlaceEstimate, VelocityFluCommand
 from offboard.engine import MissionEngine, MissionRunError
 from offboard.limits import CONTEST, STILL, CommandLimits
 from offboard.mission import Mission
@@ -42,6 +42,8 @@ class Moment:
             otherwise how box and caps have limited the mission's command, or that it hovers because there are
             no images; empty if it flies as commanded.
         navigation: the navigator's map and plan, renewed five times a second; None without a navigator.
+        place: where the app itself has estimated the drone to be; None if it believes its `state`, or the
+            mission did nothing in this tick.
     """
 
     state: DroneState
@@ -53,6 +55,7 @@ class Moment:
     paused: bool = False  # an operator has the sticks; the mission waits
     remark: str = ""
     navigation: NavigationView | None = None
+    place: PlaceEstimate | None = None
 
 
 Observer = Callable[[Moment], None]
@@ -261,6 +264,8 @@ class _Flight:
         command = self.engine.tick(imu, detections, state.time_us, state, images=images, sent=self.sent)
         if self.engine.has_navigator:
             self.perception.space_images(self.engine.image_period_s)
+        if self.flying and self.engine.drone is not None:
+            self.drone.report_place(self.engine.drone)
         motors_on = self.engine.pilot.cmd.on
         self.motors_requested = self.motors_requested or motors_on
         self.sent = None
@@ -306,7 +311,7 @@ class _Flight:
     def _observe(self, state: DroneState, limited: LimitedCommand, detections: Detections) -> None:
         if self.observer is None:
             return
-        engine = self.engine
+        engine, drone = self.engine, self.engine.drone
         self.observer(
             Moment(
                 state,
@@ -318,6 +323,7 @@ class _Flight:
                 paused=self.paused,
                 remark="; ".join(filter(None, (self.remark, limited.remark))),
                 navigation=self._navigation_at(state.time_us),
+                place=drone.estimate if drone is not None and drone.time_us == state.time_us else None,
             )
         )
 

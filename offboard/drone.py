@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import AsyncGenerator
 from dataclasses import dataclass
-from math import isfinite, isnan
+from math import isfinite, isnan, sqrt
 from typing import Literal, Protocol
 
 from framerunner.errors import UserError
@@ -30,6 +30,9 @@ class ImuInterval:
     specific_force_flu_m_s2: Vec3
 
 
+SURE_OF_POSITION_M = 0.1  # a vehicle that says more of its position does not know it
+
+
 @dataclass(frozen=True, slots=True)
 class ReportedAccuracy:
     """What the vehicle tells of the errors of its own estimate (standard deviations), and of its jumps.
@@ -49,6 +52,29 @@ class ReportedAccuracy:
     climb_std_m_s: float
     heading_std_rad: float
     resets: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceEstimate:
+    """Where the app itself has estimated the drone to be, since its vehicle does not know that well.
+
+    Attributes:
+        position_m: arena axes.
+        yaw_rad: -pi..pi.
+        covariance_m2: of the position, row by row: xx, xy, xz, yx and so on, nine numbers.
+        yaw_std_rad: standard deviation of the yaw.
+    """
+
+    position_m: Vec3
+    yaw_rad: float
+    covariance_m2: tuple[float, ...]
+    yaw_std_rad: float
+
+    @property
+    def position_std_m(self) -> Vec3:
+        """Standard deviations along x, y, z."""
+        xx, yy, zz = self.covariance_m2[::4]
+        return (sqrt(xx), sqrt(yy), sqrt(zz))
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +98,7 @@ class DroneState:
     attitude_arena: Quaternion = (1.0, 0.0, 0.0, 0.0)  # body FLU to arena, with the heading `yaw`
     camera_attitude_arena: Quaternion | None = None  # of a camera on a gimbal, forward-left-up to arena
     imu: tuple[ImuInterval, ...] = ()  # since the state before, oldest first; empty: it sends none
-    position_std_m: float = 0.0  # of what the app has estimated itself, of the coordinate known worst; else 0
+    estimate: PlaceEstimate | None = None  # if the app has estimated itself where the drone is, and how well
     accuracy: ReportedAccuracy | None = None  # None: the vehicle does not tell
     missed: tuple[DroneState, ...] = ()  # at the ticks that were skipped before this one, oldest first
 
@@ -209,6 +235,9 @@ class Drone(Protocol):
             OutsideBoxError: the drone has left its box and does not come back.
         """
         ...
+
+    def report_place(self, state: DroneState) -> None:
+        """Tell the vehicle where the app has estimated it to be, if it knows that from nothing else."""
 
     async def close(self) -> None:
         """Release the vehicle."""

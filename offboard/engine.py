@@ -138,7 +138,8 @@ class MissionEngine:
                 if state is None:
                     raise PilotError("its map of frames needs the drone's state; give it to each tick")
                 self.drone = at = self._navigator.observe(state, images, sent)
-                pilot.imu = Imu(at.x, at.y, at.z, at.yaw, at.position_std_m)
+                std_m = 0.0 if at.estimate is None else max(at.estimate.position_std_m)
+                pilot.imu = Imu(at.x, at.y, at.z, at.yaw, std_m)
             self._count_unseen(time_us)
             if self._present is None:
                 self._start(time_us)

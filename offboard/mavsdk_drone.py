@@ -21,8 +21,9 @@ from offboard.link.autopilots import open_dialect
 from offboard.link.companion import Companion
 from offboard.link.connections import check_is_free, new_mavsdk, open_connections
 from offboard.link.dialect import Dialect
-from offboard.link.direct import synchronous
+from offboard.link.direct import DirectMessages, synchronous
 from offboard.link.inertial import InertialFeed
+from offboard.link.place_sender import PlaceSender
 from offboard.link.process_guard import ProcessGuard
 from offboard.link.reported_state import reported_state
 from offboard.link.resets import ResetFeed, followed
@@ -76,6 +77,7 @@ class MavsdkDrone:
         corrects: commands are corrected if the vehicle answers late; see `CommandTracker`.
         system_id: of the vehicle that was checked, by MAVLink; no other one is flown. None: any.
         when_hung: what is requested for a vehicle in offboard when this app hangs.
+        reports_place: the vehicle is sent where it is, at first where it stands.
 
     Attributes:
         recording_problem: why recording ended before the flight; set by `disconnect`.
@@ -96,6 +98,7 @@ class MavsdkDrone:
         corrects: bool = True,
         system_id: int | None = None,
         when_hung: AbortAction = "hold",
+        reports_place: bool = False,
     ) -> None:
         self.recording_problem = ""
         self._url = parse_url(url)
@@ -129,6 +132,7 @@ class MavsdkDrone:
         self._when_hung, self._asked_when_hung = when_hung, "stopped sending"
         self._shared_with: list[str] = []
         self._limits = limits or VelocityLimits()
+        self._place = PlaceSender(self._start_arena) if reports_place else None
 
     def record_to(self, path: Path) -> None:
         """Record all MAVLink traffic as a tlog from `connect` to `close`."""
@@ -192,8 +196,15 @@ class MavsdkDrone:
         self._inertial.subscribe(synchronous(self._direct))
         if new.has_resets:
             self._resets.subscribe(synchronous(self._direct))
+        if self._place is not None:
+            self._place.begin(DirectMessages(self._direct, system_id))
         if new.exchange is None:
             await self._requests.wait(new.request_streams())
+
+    def report_place(self, state: DroneState) -> None:
+        """See `Drone.report_place`."""
+        if self._place is not None and self._commanding:
+            self._place.send(state)
 
     async def ready(self) -> None:
         """Wait until the vehicle can be armed; then determine the axes."""
@@ -412,6 +423,8 @@ class MavsdkDrone:
         self._commanding = False
         self._watchdog.stop()
         self._ticks.release()
+        if self._place is not None:
+            self._place.end()
         if self._dialect is not None and self._in_offboard and self._feed.armed is False:
             await self._hold_on_ground()
         await self._requests.wait_for_all()
@@ -457,7 +470,7 @@ class MavsdkDrone:
         assert self._alignment is not None, "ready() comes first"
         sample, missed = self._feed.take_samples()
         for jump in self._resets.take():
-            self._alignment = followed(self._alignment, jump)
+            self._alignment = followed(self._alignment, jump, drifts=self._inertial.drifts)
             self._tracker.reset()
         feed, alignment, dialect = self._feed, self._alignment, self._stream
         skipped = tuple(reported_state(before, feed, alignment, dialect) for before in missed)

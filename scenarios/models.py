@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 from framerunner.errors import UserError
 from framerunner.files.yaml_file import refusal
 from framerunner.geometry.axes import flip_quaternion
+from framerunner.geometry.base_marker import FACES, BaseMarkers, MarkerFamily
 from framerunner.geometry.gate_shape import BAR_LIMITS_M, PAPER_GATE, SIZE_LIMITS_M, GateShape
 from framerunner.geometry.rotations import quaternion_from_euler
 from framerunner.geometry.solids import Solid
@@ -21,6 +22,7 @@ from scenarios.air import Wind
 from scenarios.faults.declaration import Fault
 from scenarios.goals import Goal
 from scenarios.imaging.effects import CameraEffects, Hall, Patch
+from scenarios.imaging.textures import Texture
 from scenarios.part import Component, Metres, OnDrone, Part, Turn
 
 
@@ -50,6 +52,7 @@ DECOY_COLOURS: tuple[DecoyColour, ...] = ("cyan", "magenta")
 
 _SHORTEST_DIRECTION = 1e-6
 _SHORTEST_M = 0.001  # of a part of a wall; a doorway may end where the wall does
+PERSON_CLEAR_M = 0.3  # from the arena to the middle of a person
 START_CLEAR_M = 0.3  # from the start's centre to a pole or wall: more than half of any airframe
 
 Radians = Annotated[float, Field(ge=-6.3, le=6.3, allow_inf_nan=False)]
@@ -74,8 +77,30 @@ class Arena(Part):
     margin_m: float = Field(1.0, ge=0, le=100, description="how far outside the app lets the drone fly")
 
 
+class BaseMarker(Part):
+    """Printed markers on the base: on top, and below the top on each side; `scenario markers` makes them."""
+
+    family: MarkerFamily = Field("aruco_4x4", description="kind of markers; aruco_4x4 is read from farther")
+    first: int = Field(0, ge=0, le=10_000, description="number of the top's; the sides have the next four")
+    edge_m: float = Field(0.27, ge=0.02, le=5, description="edge of the black square")
+
+    @property
+    def markers(self) -> BaseMarkers:
+        """As a camera reads them."""
+        return BaseMarkers(self.family, self.first, self.edge_m)
+
+    @model_validator(mode="after")
+    def _are_in_their_family(self) -> Self:
+        last = self.markers.count - FACES
+        if self.first > last:
+            raise refusal(self.first, f"is too large for {self.family}; use {last} or less", "first")
+        return self
+
+
 class Base(Part):
     """The cube the drone starts from and lands on."""
+
+    often_unused: ClassVar = ("marker",)
 
     x_m: Metres = Field(0.0, description="centre")
     y_m: Metres = Field(0.0, description="centre")
@@ -87,6 +112,15 @@ class Base(Part):
         lt=1,
         description="edge of the brighter square on its top, as a share of the top's; 0: none",
     )
+    marker: BaseMarker | None = Field(None, description="printed markers on it; by default there are none")
+
+    @model_validator(mode="after")
+    def _has_room_for_markers(self) -> Self:
+        if self.marker is not None and self.marker.markers.sheet_m > min(self.edge_m, self.top_m):
+            most_m = min(self.edge_m, self.top_m) * self.marker.edge_m / self.marker.markers.sheet_m
+            message = f"is too large for the base with its white rim; use {most_m:.3f} or less"
+            raise refusal(self.marker.edge_m, message, "marker", "edge_m")
+        return self
 
     @property
     def solid(self) -> Solid:
@@ -337,6 +371,7 @@ class Scenario(Part):
         "sensors",
         "wind",
         "faults",
+        "floor_texture",
         "hall",
         "patches",
         "gripper",
@@ -354,6 +389,9 @@ class Scenario(Part):
     walls: tuple[Wall, ...] = Field((), description="obstacles that stand on the floor")
     camera: Camera = Field(Camera(), description="the drone's camera")
     light: Light = Field(Light(), description="sun and sky")
+    floor_texture: Texture | None = Field(
+        None, description="of the floor, up to the hall's walls if there is one; by default tatami mats"
+    )
     hall: Hall | None = Field(None, description="walls around the arena that are only seen")
     patches: tuple[Patch, ...] = Field((), description="flat things on the floor and on the hall's walls")
     try_limit_s: float = Field(180.0, ge=1, le=36000, description="longest try, motors on to motors off")
@@ -410,6 +448,18 @@ class Scenario(Part):
                 if patch.surface != "floor":
                     message = "is a wall of the hall, and there is none; add hall: {} or put it on the floor"
                     raise refusal(patch.surface, message, "patches", index, "surface")
+        return self
+
+    @model_validator(mode="after")
+    def _people_are_outside_the_arena(self) -> Self:
+        arena, hall = self.arena, self.hall or Hall()
+        for index, person in enumerate(hall.people):
+            beyond_m = max(abs(person.x_m) - arena.length_x_m / 2, abs(person.y_m) - arena.width_y_m / 2)
+            if not PERSON_CLEAR_M <= beyond_m <= hall.beyond_m:
+                message = (
+                    f"is not between arena and walls; keep it {PERSON_CLEAR_M} m or more outside the arena"
+                )
+                raise refusal(person.x_m, message, "hall", "people", index, "x_m")
         return self
 
     @model_validator(mode="after")

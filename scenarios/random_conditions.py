@@ -1,42 +1,24 @@
-"""What makes random scenarios hard beside their layout: wind, faults, camera, light and clutter."""
+"""What makes random scenarios hard beside their layout: wind, faults, camera and light."""
 
 from __future__ import annotations
 
 from math import cos, sin
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from framerunner.geometry.gate_shape import PAPER_GATE
 from scenarios.air import MAX_TURBULENCE_M_S, MAX_WIND_M_S, Wind, check_gusts
 from scenarios.faults.declaration import MAX_TIME_S, Fault, FaultPart
-from scenarios.imaging.effects import (
-    MAX_K,
-    MAX_P,
-    PATCH_COLOURS,
-    SURFACES,
-    CameraEffects,
-    Hall,
-    LensDistortion,
-    Patch,
-    PatchColour,
-    Surface,
-)
-from scenarios.models import Arena, Camera, Light
+from scenarios.imaging.effects import MAX_K, MAX_P, CameraEffects, LensDistortion
+from scenarios.models import Camera, Light
 from scenarios.part import Part
 from scenarios.random_numbers import Range, random_stream, within
-
-if TYPE_CHECKING:
-    from numpy.random import Generator
 
 _NONE = Range(low=0.0, high=0.0)
 _ALL = Range(low=1.0, high=1.0)
 _ALL_ROUND_RAD = Range(low=-3.141, high=3.141)
 _QUARTER_RAD = 1.57
 _QUAD = 4
-_BORDERS = 3  # every third patch is nothing but a border, in the proportions of a gate
-_GATE_SHAPE = PAPER_GATE.outer_height_m / PAPER_GATE.outer_width_m
-_SLANT_RAD = Range(low=-0.3, high=0.3)
 
 _WindSpeed = Annotated[Range, within(0.0, MAX_WIND_M_S)]
 _Radial = Annotated[Range, within(-MAX_K, MAX_K)]
@@ -169,63 +151,4 @@ class RandomLight(Part):
             sun_direction_arena=(x, y, z),
             ambient=self.ambient.draw_value(random_stream(seed, "light.ambient")),
             turn_rad_s=self.turn_rad_s.draw_value(random_stream(seed, "light.turn")),
-        )
-
-
-class RandomClutter(Part):
-    """Flat things in all colours on the floor and on the walls of a hall; every third is only a border."""
-
-    posters: int = Field(0, ge=0, le=100, description="how many things on the walls")
-    marks: int = Field(0, ge=0, le=100, description="how many things on the floor")
-    size_m: Annotated[Range, within(0.05, 10.0)] = Field(
-        description="width and height of each; a border has the proportions of a frame"
-    )
-    up_m: Range = Field(description="centres of the posters above the floor")
-    border_m: Annotated[Range, within(0.005, 1.0)] = Field(description="width of borders")
-    beyond_m: float = Field(
-        Hall().beyond_m, ge=0.01, le=100, description="from the arena to the hall's walls"
-    )
-    height_m: float = Field(Hall().height_m, ge=0.1, le=100, description="of the hall")
-
-    @model_validator(mode="after")
-    def _posters_are_on_the_walls(self) -> Self:
-        self.up_m.check(0.0, self.height_m, "up_m")
-        return self
-
-    @property
-    def hall(self) -> Hall:
-        """The hall on whose walls they are."""
-        return Hall(beyond_m=self.beyond_m, height_m=self.height_m)
-
-    def draw(self, seed: int) -> tuple[Patch, ...]:
-        """Draw all that lies and hangs around."""
-        stream = random_stream(seed, "clutter")
-        surfaces = [SURFACES[1 + index % 4] for index in range(self.posters)] + [SURFACES[0]] * self.marks
-        return tuple(self._patch(surface, index, stream) for index, surface in enumerate(surfaces))
-
-    def _patch(self, surface: Surface, index: int, stream: Generator) -> Patch:
-        arena = Arena()
-        colour: PatchColour = PATCH_COLOURS[int(stream.random() * len(PATCH_COLOURS))]
-        x_m, y_m = arena.length_x_m / 2, arena.width_y_m / 2
-        if surface == "floor":
-            across = Range(low=-x_m, high=x_m).draw_value(stream)
-            up = Range(low=-y_m, high=y_m).draw_value(stream)
-            turn = _ALL_ROUND_RAD.draw_value(stream)
-        else:
-            half = (y_m if surface in {"front", "back"} else x_m) + self.beyond_m - 1.0
-            across = Range(low=-half, high=half).draw_value(stream)
-            up = self.up_m.draw_value(stream)
-            turn = _SLANT_RAD.draw_value(stream)
-        width, height = self.size_m.draw_value(stream), self.size_m.draw_value(stream)
-        border = self.border_m.draw_value(stream)
-        is_border = index % _BORDERS == 0
-        return Patch(
-            surface=surface,
-            colour=colour,
-            across_m=across,
-            up_m=up,
-            width_m=width,
-            height_m=round(width * _GATE_SHAPE, 3) if is_border else height,
-            turn_rad=turn,
-            border_m=border if is_border else None,
         )

@@ -17,9 +17,11 @@ from framerunner.files.yaml_file import FileKind
 from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import Vec3
 from scenarios.air import Wind
-from scenarios.models import COLOURS, Arena, Base, Camera, Gate, Light, Scenario, StartPose
+from scenarios.imaging.effects import Hall
+from scenarios.models import COLOURS, Arena, Base, BaseMarker, Camera, Gate, Light, Scenario, StartPose
 from scenarios.part import Part
-from scenarios.random_conditions import RandomClutter, RandomEffects, RandomFault, RandomLight, RandomWind
+from scenarios.random_conditions import RandomEffects, RandomFault, RandomLight, RandomWind
+from scenarios.random_hall import RandomClutter, RandomTextures
 from scenarios.random_numbers import (
     MAX_DRAWS,
     STEPS_PER_UNIT,
@@ -142,6 +144,10 @@ class Level(Part):
     clutter: RandomClutter | None = Field(
         None, description="a hall around the arena with things on walls and floor"
     )
+    textures: RandomTextures | None = Field(
+        None, description="what floor and walls look like; by default tatami mats and plain walls"
+    )
+    base_marker: BaseMarker | None = Field(None, description="printed markers on the base; by default none")
     airframe: str | None = Field(None, description="name of the drone to fly; by default the challenge's")
     sensors: str | None = Field(None, description="name of the drone's sensor suite, or a file of one")
 
@@ -187,18 +193,25 @@ def random_scenario(level: Level, seed: int) -> Scenario:
     scenario = Scenario(
         name=f"{level.name}-{seed}",
         description=f"Random scenario of level {level.name}, seed {seed}.",
-        base=base,
+        base=base if level.base_marker is None else base.model_copy(update={"marker": level.base_marker}),
         start=StartPose(x_m=base.x_m, y_m=base.y_m, yaw_rad=yaw_rad),
         frames=gates,
         wind=Wind() if level.wind is None else level.wind.draw(seed),
         faults=() if level.faults is None else (level.faults.draw(seed),),
         camera=Camera(effects=effects) if level.view is None else level.view.draw(seed, effects),
         light=Light() if level.light is None else level.light.draw(seed),
-        hall=None if level.clutter is None else level.clutter.hall,
-        patches=() if level.clutter is None else level.clutter.draw(seed),
+        floor_texture=None if level.textures is None else level.textures.draw_floor(seed),
+        hall=_draw_hall(level, seed),
+        patches=() if level.clutter is None else level.clutter.draw_patches(seed),
         **{name: value for name in ("airframe", "sensors") if (value := getattr(level, name)) is not None},
     )
     return scenario if level.obstacles is None else add_obstacles(scenario, level.obstacles, seed)
+
+
+def _draw_hall(level: Level, seed: int) -> Hall | None:
+    if level.clutter is None:
+        return None
+    return level.clutter.draw_hall(seed, None if level.textures is None else level.textures.draw_walls(seed))
 
 
 def _draw_layout(level: Level, seed: int) -> tuple[Base, tuple[Gate, ...]]:

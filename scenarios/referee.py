@@ -9,7 +9,7 @@ from framerunner.geometry.vectors import Vec3
 from scenarios.crossing import Boundary, Passage, PathWatch
 from scenarios.goals import GoalWatch
 from scenarios.models import COLOURS, Scenario, TrueState, ground_height
-from scenarios.result import RefereeReport, RefereeSnapshot
+from scenarios.result import RefereeReport, RefereeSnapshot, TimedPosition
 from scenarios.touchdown import (
     HARD_HIT_M_S,
     TIPPED_OVER,
@@ -22,6 +22,7 @@ from scenarios.touchdown import (
 from scenarios.verdict import TryFacts, judge
 
 PENALTY_S_PER_S = 1.0  # outside the arena time counts double
+_FLOWN_STEP_US = 100_000
 CONTACT_GAP_US = 500_000  # a gate touched again sooner is still the same contact
 TAKEN_OFF_M = 0.1  # rise that makes a take-off
 IN_AIR_M = 0.3  # height above ground at which a try that begins is already a flight
@@ -91,6 +92,13 @@ class Referee:
         self._crash = ""
         self._timed_out = False
         self._landing: Landing | None = None
+        self._flown: list[TimedPosition] = []
+        self._next_flown_us = 0
+
+    @property
+    def flown_path(self) -> tuple[TimedPosition, ...]:
+        """Where the drone was in the try every 0.1 s: seconds since motors on, and arena metres."""
+        return tuple(self._flown)
 
     def update(self, state: TrueState) -> None:
         """Take the next state. States that are not finite or go back in time are counted and ignored."""
@@ -155,7 +163,10 @@ class Referee:
         return next((colour for colour in self._expected if colour not in self._crossings), None)
 
     def _watch(self, state: TrueState) -> None:
-        """Look for contacts with gates and obstacles, and for crashes."""
+        """Look for contacts with gates and obstacles, and for crashes; note where the drone is."""
+        if state.time_us >= self._next_flown_us:
+            self._next_flown_us = state.time_us + _FLOWN_STEP_US
+            self._flown.append(((state.time_us - self._start_us) * 1e-6, *state.position_arena_m))
         if state.contacts:
             self._count_contacts(state)
         crash = self._crash_watch.follow(state, self._taken_off)

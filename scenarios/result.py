@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic.json_schema import GenerateJsonSchema
@@ -191,8 +191,9 @@ class _Flown(_Record):
 class FlightResult(RefereeReport, _Flown):
     """The result of a flight, as `result.json` has it.
 
-    A field that was never set is not written: `state_sha256` is set in lockstep flights; `timing`, and
-    `lift_m` where frames were lifted, in real time; recordings have no wall times.
+    A field that was never set is not written: errors of the place are set where the truth is known, its
+    standard deviation where the app has estimated the place; `state_sha256` in lockstep flights; `timing`,
+    and `lift_m` where frames were lifted, in real time; recordings have no wall times.
     """
 
     cause: Text = Field("", description="why the flight was not clean, or its mission broken off; else empty")
@@ -226,6 +227,19 @@ class FlightResult(RefereeReport, _Flown):
     )
     fault_outcome: Literal["as expected", "not as expected", ""] = Field(
         "", description="whether it ended so; empty: nothing was expected"
+    )
+    place_errors_m: tuple[Metres, ...] = Field(
+        (),
+        max_length=10,
+        description="how far from the true place that was by which the drone was flown (estimated by the app "
+        "or, if it estimated none, reported by the vehicle), one for each of crossing_times_s",
+    )
+    last_place_error_m: Metres = Field(0.0, description="likewise when the motors stopped")
+    largest_place_std_m: Metres = Field(
+        0.0, description="standard deviation of the place estimated by the app, of x, y or z, when largest"
+    )
+    largest_reported_error_m: Metres = Field(
+        0.0, description="how far from the true place the place was that the vehicle reported, at most"
     )
     state_sha256: str = Field(
         "", max_length=64, description="over the true state of every control tick of a lockstep flight"
@@ -278,6 +292,9 @@ class StandingPlace(_Record):
     yaw_rad: float
 
 
+TimedPosition: TypeAlias = tuple[float, float, float, float]  # seconds since motors on, arena metres
+
+
 class Standing(_Record):
     """How a try stands, as `/referee.json` has it."""
 
@@ -289,9 +306,11 @@ class Standing(_Record):
     stands_at: StandingPlace | None = (
         None  # None if it does not stand upright with its motors off, or unknown
     )
+    position_arena_m: tuple[Metres, Metres, Metres] | None = None  # where it truly is; None if unknown
     snapshot: RefereeSnapshot
     report: RefereeReport  # what the try would be worth if it ended now
     faults: FaultFacts = FaultFacts()
+    flown_path: tuple[TimedPosition, ...] = ()  # every 0.1 s; only if a report was asked for
 
     @property
     def ended(self) -> bool:
@@ -307,6 +326,10 @@ def first_error(error: ValidationError) -> str:
 
 
 _OPTIONAL = (
+    "place_errors_m",
+    "last_place_error_m",
+    "largest_place_std_m",
+    "largest_reported_error_m",
     "state_sha256",
     "lift_m",
     "timing",

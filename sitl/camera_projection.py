@@ -20,6 +20,7 @@ from framerunner.geometry.rotations import RotationRows
 from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import Vec3
 from sitl.camera_scene import WALL, Bgr, Face
+from sitl.optics.texture import FaceTexture
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]
@@ -35,6 +36,7 @@ _CUT_BITS = 0b00111101  # beyond the near plane or the window
 _MOST_ROLLED = 2.0  # heights of the canvas: what is farther above or below it moves with this row
 _FINE_PX = 20_000  # what is painted finely has no more pixels than this
 _SAME_M = 1e-6  # edges nearer than this are the same
+_NEAR_M2 = 1e-4  # of edges that may be so near; much more than the rounding of a large arena's places
 _LEAST_TURN = 1e-3  # twice the area of a corner's triangle, so that edges in line do not divide by zero
 _LEAST_WIDTH = 0.62
 """Pixels: with this, polygons of all widths below one are as wide as they should be on average."""
@@ -76,12 +78,13 @@ class Pinhole:
 
 @dataclass(frozen=True, slots=True)
 class MeshFace:
-    """Number of a face, the range of its corners among all corners, and its colour."""
+    """Number of a face, the range of its corners among all corners, and its colour or picture."""
 
     index: int
     start: int
     stop: int
     colour: Bgr
+    texture: FaceTexture | None
 
 
 class Mesh:
@@ -97,7 +100,8 @@ class Mesh:
         stops = np.cumsum([len(face.corners_arena_m) for face in faces]).tolist()
         starts = [0, *stops[:-1]]
         self.faces = tuple(
-            MeshFace(index, starts[index], stops[index], face.colour) for index, face in enumerate(faces)
+            MeshFace(index, starts[index], stops[index], face.colour, face.texture)
+            for index, face in enumerate(faces)
         )
         corners = np.concatenate([face.corners_arena_m for face in faces])
         self._corners = np.vstack([corners.T, np.ones(len(corners))])
@@ -128,7 +132,8 @@ class Mesh:
                 canvas has: every corner is where it is when its own row is read. Between corners, edges are
                 straight.
         """
-        matrix = self._borders @ self._pinhole.matrix(eye_arena_m, rotation)
+        to_canvas = self._pinhole.matrix(eye_arena_m, rotation)
+        matrix = self._borders @ to_canvas
         near_m = self._pinhole.near_m
         matrix[3, 3] -= near_m
         matrix[4, 3] += self._pinhole.far_m
@@ -153,7 +158,16 @@ class Mesh:
         seen &= is_wide | (crossing != 0)
         pixels = np.rint(inset, out=inset).T.astype(np.int32, order="C")
         return Projection(
-            projected, pixels, seen.tobytes(), crossing.tolist(), near_m, self._window, views.T.tolist()
+            eye_arena_m=eye_arena_m,
+            matrix=to_canvas,
+            drift=drift,
+            corners=projected,
+            pixels=pixels,
+            seen=seen.tobytes(),
+            to_cut=crossing.tolist(),
+            near_m=near_m,
+            window=self._window,
+            views=views.T.tolist(),
         )
 
     def _neighbours(self, faces: Sequence[Face], corners: Floats) -> Ints64:
@@ -170,9 +184,7 @@ class Mesh:
                 part = part[[faces[k].name == WALL for k in of_face[part]]]
             if not len(part):
                 continue
-            is_along = of_face[part][:, None] != of_face[part]
-            for points in (corners[part], ends[part]):
-                is_along &= _distances(points, corners[part], ends[part]) < _SAME_M
+            is_along = _are_along(corners[part], ends[part], of_face[part])
             beside[part] = np.where(is_along.any(axis=1), of_face[part][is_along.argmax(axis=1)], len(faces))
         return beside
 
@@ -216,6 +228,9 @@ class Mesh:
 class Projection:
     """All faces seen from one pose of the camera; u and v in sixteenths of a pixel."""
 
+    eye_arena_m: Vec3
+    matrix: Floats  # see `Pinhole.matrix`
+    drift: Floats | None  # see `Mesh.project`
     corners: Floats  # columns (u w, v w, w, ...), one for every corner
     pixels: Ints  # (u, v) of every corner in the view of its part, shape (n, 2); wrong where cuts are needed
     seen: bytes  # per face, 1 if it faces the eye and is not wholly outside the view
@@ -245,12 +260,35 @@ def inset_outline(points: Floats) -> Ints | None:
     return np.rint(inset).T.astype(np.int32, order="C") if is_wide[0] else None
 
 
+def _are_along(starts: Floats, ends: Floats, of_face: Ints64) -> Flags:
+    """Which edges of faces lie on which edges of other faces, shape (n, n)."""
+    along: Flags = of_face[:, None] != of_face
+    for points in (starts, ends):
+        along &= _squares(points, starts, ends) < _NEAR_M2
+    first, second = np.nonzero(along)
+    for points in (starts, ends):
+        apart_m = _distances(points[first], starts[second], ends[second])
+        along[first, second] &= apart_m < _SAME_M
+    return along
+
+
+def _squares(points: Floats, starts: Floats, ends: Floats) -> Floats:
+    """About the squares of the distances of all points and line segments, m², shape (points, segments)."""
+    edges = ends - starts
+    lengths2 = np.maximum((edges * edges).sum(axis=1), 1e-12)
+    ways2 = (points * points).sum(axis=1)[:, None] - 2.0 * points @ starts.T + (starts * starts).sum(axis=1)
+    dots = points @ edges.T - (starts * edges).sum(axis=1)
+    share = np.clip(dots / lengths2, 0.0, 1.0)
+    squares: Floats = ways2 - share * (2.0 * dots - share * lengths2)
+    return squares
+
+
 def _distances(points: Floats, starts: Floats, ends: Floats) -> Floats:
-    """From every point to every line segment, metres, shape (points, segments)."""
+    """From each point to its line segment, metres, shape (n,)."""
     along = ends - starts
-    beyond = points[:, None] - starts
-    share = (beyond * along).sum(axis=-1) / np.maximum((along * along).sum(axis=-1), 1e-12)
-    apart: Floats = np.linalg.norm(beyond - np.clip(share, 0.0, 1.0)[..., None] * along, axis=-1)
+    beyond = points - starts
+    share = (beyond * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-12)
+    apart: Floats = np.linalg.norm(beyond - np.clip(share, 0.0, 1.0)[:, None] * along, axis=1)
     return apart
 
 

@@ -20,9 +20,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from framerunner.geometry.base_marker import BaseMarkers
 from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import Vec3
-from scenarios.models import Arena, Light, Scenario, UprightGate
+from scenarios.models import Arena, Base, Light, Scenario, UprightGate
+from sitl.optics.texture import FaceTexture
 from sitl.solids import gate_solids
 
 Bgr = tuple[int, int, int]
@@ -42,6 +44,8 @@ TATAMI_MAT_BGR: Bgr = (55, 168, 204)
 PRISM_BGR: Bgr = (160, 66, 109)  # of poles and walls: violet
 BASE_BGR: Bgr = (168, 170, 172)
 BASE_MARK_BGR: Bgr = (238, 238, 238)
+PAPER_BGR: Bgr = (238, 238, 238)
+INK_BGR: Bgr = (26, 26, 26)
 DRONE_BGR: Bgr = (64, 62, 60)
 
 WALL = "hall"
@@ -49,7 +53,7 @@ WALL = "hall"
 
 _MAT_M = 2.0  # edge of one mat of the tatami
 _DARKEST = 0.3  # share of its colour that every face keeps: a gate's colour must stay recognisable
-_SHADOW = 0.6  # brightness of the floor in a shadow
+SHADOW = 0.6  # brightness of the floor in a shadow
 _FLAT_M = 1e-7  # corners nearer to a plane than this lie on it
 _UP: Vec3 = (0.0, 0.0, 1.0)
 
@@ -62,6 +66,7 @@ class Face:
     normal_arena: Vec3  # unit vector to the side it is seen from
     colour: Bgr  # as painted, shading included
     name: str  # of its solid; "tatami" or "ground" on the floor
+    texture: FaceTexture | None = None  # a picture instead of the colour
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,7 +101,7 @@ def build_scene(scenario: Scenario, light: Light | None = None) -> Scene:
         mats=_mats(arena, light),
         shadows=tuple(shadows),
         bodies=(
-            _base_body(base, scenario.base.mark_share, light),
+            _base_body(scenario.base, light),
             *(_gate_body(gate, light) for gate in gates),
             *(Body(prism, _upright_faces(prism, PRISM_BGR, light)) for prism in prisms),
         ),
@@ -109,11 +114,16 @@ def _dim(colour: Bgr, share: float) -> Bgr:
 
 
 def lit(colour: Bgr, normal: Vec3, light: Light) -> Bgr:
-    """The colour of a face: ambient light and the sun by Lambert's law, no darker than `_DARKEST`."""
+    """The colour of a face in a light, see `brightness`."""
+    return _dim(colour, brightness(normal, light))
+
+
+def brightness(normal: Vec3, light: Light) -> float:
+    """Share of its colour that a face has: ambient light and the sun by Lambert's law, `_DARKEST` or more."""
     x, y, z = light.sun_direction_arena
     length = hypot(x, y, z)
     facing = -(normal[0] * x + normal[1] * y + normal[2] * z) / length if length > 0 else 0.0
-    return _dim(colour, max(_DARKEST, light.ambient + (1.0 - light.ambient) * max(0.0, facing)))
+    return max(_DARKEST, light.ambient + (1.0 - light.ambient) * max(0.0, facing))
 
 
 def _on_floor(corners_xy: Sequence[Sequence[float]] | Floats, colour: Bgr, name: str) -> Face:
@@ -144,7 +154,7 @@ def _mats(arena: Arena, light: Light) -> tuple[Face, ...]:
     )
 
 
-def _face(box: Solid, local: Sequence[Vec3], normal: Vec3, colour: Bgr, light: Light) -> Face:
+def box_face(box: Solid, local: Sequence[Vec3], normal: Vec3, colour: Bgr, light: Light) -> Face:
     """A face given in a box's own axes (metres from its centre)."""
     c, s = box.turn
     turned = (c * normal[0] - s * normal[1], s * normal[0] + c * normal[1], normal[2])
@@ -153,20 +163,37 @@ def _face(box: Solid, local: Sequence[Vec3], normal: Vec3, colour: Bgr, light: L
     )
 
 
-def _base_body(box: Solid, mark_share: float, light: Light) -> Body:
+def _base_body(base: Base, light: Light) -> Body:
+    box = base.solid
     half, _, top = box.half_extents_m
-    if mark_share == 0.0:
-        return Body(box, _upright_faces(box, BASE_BGR, light))
-    mark = mark_share * half
-    inset: list[Vec3] = [(-mark, -mark, top), (mark, -mark, top), (mark, mark, top), (-mark, mark, top)]
-    mark_face = _face(box, inset, _UP, BASE_MARK_BGR, light)
-    return Body(box, (*_upright_faces(box, BASE_BGR, light), mark_face))
+    faces = list(_upright_faces(box, BASE_BGR, light))
+    if base.mark_share > 0.0:
+        mark = base.mark_share * half
+        inset: list[Vec3] = [(-mark, -mark, top), (mark, -mark, top), (mark, mark, top), (-mark, mark, top)]
+        faces.append(box_face(box, inset, _UP, BASE_MARK_BGR, light))
+    if base.marker is not None:
+        faces += _markers(box, base.marker.markers, light)
+    return Body(box, tuple(faces))
+
+
+def _markers(box: Solid, markers: BaseMarkers, light: Light) -> list[Face]:
+    """White sheets, black squares on them, and white cells in these."""
+    half, _, half_height = box.half_extents_m
+    sheet, black = markers.sheet_m / 2, markers.edge_m / 2
+    found = []
+    for marked in markers.faces(2 * half, 2 * half_height):
+        parts = [((-sheet, sheet, -sheet, sheet), PAPER_BGR), ((-black, black, -black, black), INK_BGR)]
+        parts += [(part, PAPER_BGR) for part in markers.white_parts(marked.number)]
+        for part, colour in parts:
+            local = [(x, y, z - half_height) for x, y, z in marked.rectangle(*part)]
+            found.append(box_face(box, local, marked.normal, colour, light))
+    return found
 
 
 def _upright_faces(box: Solid, colour: Bgr, light: Light) -> tuple[Face, ...]:
     """The sides and the top of a box on the floor."""
     return tuple(
-        _face(box, _side(box.half_extents_m, axis, sign), _normal(axis, sign), colour, light)
+        box_face(box, _side(box.half_extents_m, axis, sign), _normal(axis, sign), colour, light)
         for axis, sign in ((0, 1), (0, -1), (1, 1), (1, -1), (2, 1))
     )
 
@@ -183,15 +210,15 @@ def _gate_body(gate: UprightGate, light: Light) -> Body:
     inner: Vec3 = (outer[0], outer[1] - gate.bar_m, outer[2] - gate.bar_m)
     around = ((1, 1), (1, -1), (2, 1), (2, -1))
     faces = [
-        _face(box, _side(inner, axis, sign), _normal(axis, -sign), colour, light) for axis, sign in around
+        box_face(box, _side(inner, axis, sign), _normal(axis, -sign), colour, light) for axis, sign in around
     ]
     for sign in (1, -1):
         x, y, z, v, w = sign * outer[0], outer[1], outer[2], inner[1], inner[2]
         for y0, y1, z0, z1 in ((-y, y, w, z), (-y, y, -z, -w), (v, y, -w, w), (-y, -v, -w, w)):
             quad: list[Vec3] = [(x, y0, z0), (x, y1, z0), (x, y1, z1), (x, y0, z1)]
-            faces.append(_face(box, quad, _normal(0, sign), colour, light))
+            faces.append(box_face(box, quad, _normal(0, sign), colour, light))
     faces += [
-        _face(box, _side(outer, axis, sign), _normal(axis, sign), colour, light) for axis, sign in around
+        box_face(box, _side(outer, axis, sign), _normal(axis, sign), colour, light) for axis, sign in around
     ]
     return Body(box, tuple(faces), len(around))
 
@@ -257,7 +284,7 @@ def _outline(points: Floats) -> npt.NDArray[np.float32]:
 
 def _in_shadow(outline: npt.NDArray[np.float32], light: Light, *, on_tatami: bool) -> Face:
     name, colour = ("tatami", TATAMI_BGR) if on_tatami else ("ground", GROUND_BGR)
-    return _on_floor(outline.tolist(), _dim(lit(colour, _UP, light), _SHADOW), name)
+    return _on_floor(outline.tolist(), _dim(lit(colour, _UP, light), SHADOW), name)
 
 
 @dataclass(frozen=True, slots=True)

@@ -333,9 +333,11 @@ class DroneVideo:
             time_us=simulation.time_us,
             local_frame=None if origin_arena_m is None else LocalFrame(origin_arena_m=origin_arena_m),
             stands_at=standing_place(simulation.truth),
+            position_arena_m=simulation.truth.position_arena_m,
             snapshot=referee.snapshot(),
             report=referee.report(query.get("state", ""), query.get("ended")),
             faults=simulation.fault_facts(),
+            flown_path=referee.flown_path if "state" in query else (),
         )
         return standing.model_dump(mode="json")
 

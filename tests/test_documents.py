@@ -91,6 +91,7 @@ GIVEN = {
 }
 PRINTED = {
     "api.md": "clean clean after",
+    "detectors.md": "clean clean after",
     "evaluation.md": "clean ",
     "gymnasium.md": "",
     "missions.md": "name: first",
@@ -205,7 +206,7 @@ def read_workflow(text, folder):
 
 
 KINDS = {
-    "camera.md": [read_scenario, read_scenario, read_level, read_calibration, read_part_of_calibration],
+    "camera.md": [*[read_scenario] * 4, read_level, read_calibration, read_part_of_calibration],
     "ci.md": [read_workflow],
     "devices.md": [read_scenario],
     "faults.md": [read_scenario],
@@ -214,7 +215,7 @@ KINDS = {
     "real-drone.md": [read_whole_scenario],
     "scenarios.md": [
         read_whole_scenario,
-        *[read_scenario] * 4,
+        *[read_scenario] * 5,
         read_airframe,
         read_scenario,
         read_scenario,

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, get_args
+
+import numpy as np
 
 from framerunner.errors import UserError
 from framerunner.files.extensions import extension_names, find_extension
@@ -15,7 +17,9 @@ from vision.calibration.lens import Lens
 from vision.calibration.model import Calibration
 from vision.detector import detect
 from vision.gate_finder import GateFinder
-from vision.types import LEARNED, Detections, Image, Vision
+from vision.gate_model import GateModel
+from vision.gate_pose import as_seen, find_poses
+from vision.types import LEARNED, Detections, GateCorner, GateSighting, Image, Vision
 
 OWN_DETECTORS: tuple[str, ...] = (*get_args(Vision), LEARNED)
 """Names that no other package can use."""
@@ -25,8 +29,59 @@ DetectorMaker = Callable[[Calibration], Detector]
 """Makes a detector for the camera of one flight; what it keeps from image to image is in the detector."""
 
 
+_MOST_STDS = 4.0  # root mean square, by which a pose may miss the corners of which it is made
+
+
 class DetectorError(UserError):
     """A detector of others cannot be used; the message is one line for people."""
+
+
+class SightingMaker:
+    """Makes `GateSighting`s of four corners each.
+
+    Args:
+        calibration: of the camera.
+        shapes: of the gates of each colour; None: all have that of the frame challenge.
+    """
+
+    def __init__(self, calibration: Calibration, shapes: GateShapes | None = None) -> None:
+        self._lens = Lens(calibration)
+        self._shapes = shapes or GateShapes()
+
+    def sighting(
+        self,
+        colour: str,
+        corners: Sequence[tuple[float, float]],
+        std_px: float = 0.5,
+        *,
+        whole: bool = True,
+    ) -> GateSighting:
+        """A gate in an image.
+
+        Args:
+            colour: of the gate.
+            corners: of its outline, column and row, whole numbers at pixel centres: upper left, upper right,
+                lower right, lower left as seen. They may be outside the image.
+            std_px: standard deviation of each of these numbers, by which the map weighs the gate.
+            whole: nothing of the gate is hidden or outside the image.
+
+        Returns:
+            It has no poses if no upright gate looks so.
+        """
+        columns, rows = self._lens.size_px
+        places = np.array(corners, np.float64) - ((columns - 1) / 2, (rows - 1) / 2)
+        ideal = [(right, down) for right, down in self._lens.ideal(places).tolist()]
+        upper_left, upper_right, lower_right, lower_left = (
+            GateCorner(right, down, std_px, std_px) for right, down in ideal
+        )
+        model = GateModel.of_corners(self._shapes.of(colour), self._lens.focal_px)
+        poses = find_poses(ideal, model, _MOST_STDS * std_px)
+        return GateSighting(
+            colour,
+            (upper_left, upper_right, lower_right, lower_left),
+            whole,
+            tuple(as_seen(pose) for pose in poses),
+        )
 
 
 def new_detector(

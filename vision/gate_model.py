@@ -8,6 +8,7 @@ side k - 1 and side k meet: upper left, upper right, lower right, lower left.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -71,6 +72,13 @@ class GateModel:
         self.axes_places: list[Point] = [(x, y) for x, y, _ in self.axes_corners.tolist()]
         self.outer_corners = rectangle(shape.outer_width_m, shape.outer_height_m)
         self._bar_edges = self._edges()
+
+    @classmethod
+    def of_corners(cls, shape: GateShape, focal_px: float, *, of_opening: bool = False) -> Self:
+        """A gate whose bars' axes meet where the corners of another one's outline are, or of its opening."""
+        grown_m = -shape.bar_m if of_opening else shape.bar_m
+        width_m, height_m = shape.outer_width_m + grown_m, shape.outer_height_m + grown_m
+        return cls(GateShape(width_m, height_m, shape.bar_m, shape.depth_m), focal_px)
 
     def _edges(self) -> Floats:
         """Both ends of the axis and of the four edges of every bar, shape (4 sides * 5 * 2, 3)."""

@@ -148,6 +148,21 @@ class BaseSighting:
     score: float
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class PointTracks:
+    """Points that are followed from image to image, in one of them. Compare by identity: it has arrays.
+
+    Attributes:
+        numbers: of the points, each its own from its first image to its last, shape (n,).
+        pixels: right of and below the optical axis of an ideal camera, shape (n, 2).
+        rows_px: in the image as it is, below its middle: when they are read out, shape (n,).
+    """
+
+    numbers: npt.NDArray[np.int64]
+    pixels: npt.NDArray[np.float64]
+    rows_px: npt.NDArray[np.float64]
+
+
 @dataclass(frozen=True, slots=True)
 class Detections:
     """What one image showed."""
@@ -162,6 +177,7 @@ class Detections:
     frames: tuple[GateSighting, ...] = ()  # by shape; only from the gate finder
     obstacle_edges: tuple[ObstacleEdge, ...] = ()  # from left to right; only from the gate finder
     base: Annotated[BaseSighting | None, Field(description="the base, where it is expected and seen")] = None
+    tracks: PointTracks | None = None  # only from a detector that follows points
 
 
 @dataclass(frozen=True, slots=True)

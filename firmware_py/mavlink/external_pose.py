@@ -109,6 +109,18 @@ def _position_ned_m(frame: int, x: float, y: float, z: float) -> Vec3:
     return (x, -y, -z) if frame == mavlink.MAV_FRAME_LOCAL_FLU else NAN3
 
 
+def pose_of_odometry(message: Message, time_us: int) -> ExternalPose:
+    """What an ODOMETRY of a kind that is used says, true at a vehicle time."""
+    position, attitude = _diagonal(message.pose_covariance)
+    if message.estimator_type == _NAIVE:
+        position = attitude = NAN3
+    elif message.frame_id == mavlink.MAV_FRAME_LOCAL_ENU:
+        position = (position[1], position[0], position[2])
+    w, x, y, z = message.q
+    place = _position_ned_m(message.frame_id, message.x, message.y, message.z)
+    return ExternalPose(time_us, place, (w, x, y, z), None, position, attitude, NAN3, message.reset_counter)
+
+
 class ExternalPoseService(AutopilotService):
     """Passes poses of motion capture and visual odometry to the estimator."""
 
@@ -128,15 +140,7 @@ class ExternalPoseService(AutopilotService):
             if kind != _UNUSED:
                 self._refuse(f"ODOMETRY: estimator_type {kind} unsupported")
             return
-        position, attitude = _diagonal(message.pose_covariance)
-        if kind == _NAIVE:
-            position = attitude = NAN3
-        elif message.frame_id == mavlink.MAV_FRAME_LOCAL_ENU:
-            position = (position[1], position[0], position[2])
-        w, x, y, z = message.q
-        place = _position_ned_m(message.frame_id, message.x, message.y, message.z)
-        time_us, resets = self._vehicle_time_us(link, message.time_usec), message.reset_counter
-        pose = ExternalPose(time_us, place, (w, x, y, z), None, position, attitude, NAN3, resets)
+        pose = pose_of_odometry(message, self._vehicle_time_us(link, message.time_usec))
         self._use(pose, message.quality)
 
     def _vision_position_estimate(self, link: Link, message: Message) -> None:

@@ -33,8 +33,12 @@ def px4_params(
     speed: float = 1.0,
     env: bool = False,
     transmitter: bool = False,
+    real: bool = False,
 ) -> int:
     """Print the parameters by which PX4 flies an airframe here: one `NAME VALUE` a line.
+
+    With --real those by which the estimator of a real drone uses such sensors, and no others, as a file for
+    QGroundControl and for `preflight --restore-parameters`.
 
     **Examples**
 
@@ -42,19 +46,31 @@ def px4_params(
 
         framerunner px4 params abejorro --sensors outdoor --env
 
+        framerunner px4 params --real --sensors flow
+
     Args:
         airframe: name or file of the airframe
         sensors: sensor suite for which PX4's estimator is set up: mocap, outdoor, …, or a file
         speed: of the simulation, by which PX4's time-outs grow
         env: as environment variables, by which PX4 takes them at its start
         transmitter: for a pilot's remote control, too
+        real: for a real drone with motion capture or with optical flow and range finder
     """
+    from framerunner.preflight.kept import parameter_lines
     from framerunner.vehicle.airframe import load_airframe
+    from framerunner.wire.dialect import mavlink
+    from framerunner.wire.session.session import ParameterValue
     from sitl.autopilots.parameters import text_of
     from sitl.px4.build import environment
-    from sitl.px4.parameters import all_parameters
+    from sitl.px4.parameters import all_parameters, drone_parameters
     from sitl.sensors.suite import load_suite
 
+    if real:
+        kinds = {int: mavlink.MAV_PARAM_TYPE_INT32, float: mavlink.MAV_PARAM_TYPE_REAL32}
+        wanted = drone_parameters(load_suite(sensors)).items()
+        file = parameter_lines(1, (ParameterValue(name, value, kinds[type(value)]) for name, value in wanted))
+        print("\n".join(file))
+        return 0
     frame, suite = load_airframe(airframe), load_suite(sensors)
     values = all_parameters(frame, suite, speed, transmitter=transmitter)
     lines = (

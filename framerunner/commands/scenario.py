@@ -8,6 +8,7 @@ from pathlib import Path
 from cyclopts import App
 
 from framerunner.commands import WholeNumber, say, write_new
+from framerunner.errors import SettingError
 
 app = App(name="scenario", help="List, show and check scenarios.")
 
@@ -121,4 +122,33 @@ def random(
         return 0
     write_new({out: dump_yaml(drawn)})
     say(f"scenario '{drawn.name}' written to {out}")
+    return 0
+
+
+@app.command
+def markers(
+    scenario: str,
+    *,
+    out: Path = Path("base-markers.pdf"),
+) -> int:
+    """Make the printed markers of a scenario's base as PDF, true to size, with where each belongs.
+
+    With `base: {marker: {edge_m: 0.27}}` in its file, the drone's camera reads them.
+
+    **Example**
+
+        framerunner scenario markers my.yaml --out base-markers.pdf
+
+    Args:
+        scenario: name or file
+        out: PDF file to write
+    """
+    from scenarios.loader import load_scenario
+
+    loaded = load_scenario(scenario)
+    if out.exists():
+        raise SettingError(f"{out} is there already and is left as it is; choose another --out")
+    from framerunner.runs.marker_sheets import write_marker_sheets
+
+    say(f"{out}: {write_marker_sheets(loaded, out)} pages; print them at 100 %")
     return 0

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import asyncio
+import webbrowser
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import App, Parameter
 
-from framerunner.commands import WholeNumber, check_range
+from framerunner.commands import WholeNumber, check_range, say, write_new
+from framerunner.commands.monitor import PagesPort
 from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
     from framerunner.vision_evaluation.camera_chain import CameraChain
     from framerunner.vision_evaluation.evaluate import VisionSettings
+    from framerunner.vision_evaluation.label_session import Head
     from framerunner.vision_evaluation.own_pictures import OwnPictures
 
 _MAX_IMAGES = 1_000_000
@@ -119,6 +123,145 @@ def dataset(
     from framerunner.vision_evaluation.evaluate import write_dataset
 
     write_dataset(_settings(options, folder))
+    return 0
+
+
+@Parameter(name="*", group="Camera and frames, said the first time")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LabelOptions:
+    """What new labels begin with.
+
+    Attributes:
+        calibration: of the camera, a file of `framerunner camera calibrate`; it is copied to FOLDER
+        focal_px: focal length of a camera without distortion instead, pixels
+        outer: outer width and height of the frames, metres; by default the task's, 0.42 and 0.22
+        bar: width of their bars, seen from the front, metres; by default 0.02
+        corners_of: which corners are clicked; by default those of the outline
+    """
+
+    calibration: Path | None = None
+    focal_px: float | None = None
+    outer: tuple[float, float] | None = None
+    bar: float | None = None
+    corners_of: Literal["outline", "opening"] | None = None
+
+
+_AS_BEFORE = LabelOptions()
+
+
+@app.command
+def label(
+    folder: Path,
+    *,
+    options: LabelOptions = _AS_BEFORE,
+    port: PagesPort = 8091,
+    browser: Annotated[bool, Parameter(negative="--no-browser")] = True,
+) -> int:
+    """Label your own pictures in the browser, for `vision evaluate --labelled`. Stop it with Ctrl-C.
+
+    Four clicks a frame; its distance and the outline of its pose are shown at once. Every change is written
+    to labels.json in FOLDER, which also has what camera and frames are. The page is for this machine only.
+
+    **Examples**
+
+        framerunner vision label my_pictures --calibration camera.yaml
+
+        framerunner vision label my_pictures --focal-px 160.1 --outer 0.6 0.4 --bar 0.03
+
+        framerunner vision label my_pictures
+
+    Args:
+        folder: with the pictures
+        options: what camera and frames are.
+        port: TCP port of the page.
+        browser: open the page in the browser
+    """
+    from framerunner.vision_evaluation.label_session import LabelSession
+
+    session = LabelSession(folder, None if options == _AS_BEFORE else _label_head(folder, options))
+    from framerunner.vision_evaluation.label_page import serve_labels
+
+    def started(url: str) -> None:
+        say(f"labels: {url}")
+        if browser:
+            webbrowser.open(url)
+
+    asyncio.run(serve_labels(session, port, started))
+    return 0
+
+
+def _label_head(folder: Path, options: LabelOptions) -> Head:
+    """Check the options."""
+    from framerunner.camera_calibration.calibration_file import load_calibration
+    from framerunner.geometry.gate_shape import BAR_LIMITS_M, PAPER_GATE, SIZE_LIMITS_M
+    from framerunner.vision_evaluation.label_session import Head
+    from framerunner.vision_evaluation.own_pictures import PictureLabels, PictureShape, keep_calibration
+
+    if (options.calibration is None) == (options.focal_px is None):
+        raise SettingError("the first time, give either --calibration or --focal-px")
+    check_range("--focal-px", options.focal_px, 2.0, 1e5)
+    bar_m = PAPER_GATE.bar_m if options.bar is None else options.bar
+    check_range("--bar", bar_m, *BAR_LIMITS_M)
+    width_m, height_m = options.outer or (PAPER_GATE.outer_width_m, PAPER_GATE.outer_height_m)
+    for size_m in (width_m, height_m):
+        check_range("--outer", size_m, SIZE_LIMITS_M[0] + 2 * bar_m, SIZE_LIMITS_M[1])
+    path = options.calibration
+    calibration = None if path is None else load_calibration(path)
+    labels = PictureLabels.model_construct(
+        focal_px=options.focal_px,
+        calibration=None if calibration is None else keep_calibration(calibration, folder, str(path)),
+        shape=PictureShape(outer_width_m=width_m, outer_height_m=height_m, bar_m=bar_m, depth_m=bar_m),
+        corners_of=options.corners_of or "outline",
+        images=(),
+    )
+    return Head(labels, calibration)
+
+
+@app.command
+def labels(
+    folder: Path,
+    *,
+    source: Annotated[Literal["tii"], Parameter(name="--from")],
+    opening: tuple[float, float],
+    bar: float,
+    calibration: Path,
+    colour: Literal["red", "green", "blue", "cyan", "magenta"] = "red",
+) -> int:
+    """Make labels.json of the labels of a public data set, for `vision evaluate --labelled`.
+
+    `tii` is "Race Against the Machine" (https://github.com/tii-racing/drone-racing-dataset), which you
+    download yourself: pictures, and for each a text file of the same name with the corners of the openings.
+
+    **Example**
+
+        framerunner vision labels flight-01a --from tii --opening 1.5 1.5 --bar 0.3 --calibration calib.json
+
+    Args:
+        folder: with pictures and text files, in it or in folders of it; labels.json is written to it
+        source: the data set
+        opening: width and height of its gates between the bars, metres
+        bar: width of the bars, seen from the front, metres
+        calibration: of its camera: a JSON file of the data set, or one of `framerunner camera calibrate`
+        colour: by which the detector to be rated calls these gates
+    """
+    from framerunner.geometry.gate_shape import BAR_LIMITS_M, SIZE_LIMITS_M
+    from framerunner.vision_evaluation.own_pictures import FILE, PictureShape
+    from framerunner.vision_evaluation.tii_labels import convert
+
+    check_range("--bar", bar, *BAR_LIMITS_M)
+    for size_m in opening:
+        check_range("--opening", size_m, SIZE_LIMITS_M[0], SIZE_LIMITS_M[1] - 2 * bar)
+    outer_width_m, outer_height_m = (size_m + 2 * bar for size_m in opening)
+    shape = PictureShape(outer_width_m=outer_width_m, outer_height_m=outer_height_m, bar_m=bar, depth_m=bar)
+    if (folder / FILE).exists():
+        raise SettingError(f"{folder / FILE}: is there already and is left as it is; move it away")
+    converted = convert(folder, shape, colour, calibration)
+    write_new({folder / FILE: converted.labels.as_text()}, "FOLDER")
+    pictures = converted.labels.images
+    whole = sum(gate.whole for picture in pictures for gate in picture.frames)
+    say(f"{FILE}: {len(pictures)} pictures, {whole} gates wholly in view")
+    if converted.unlabelled:
+        say(f"{converted.unlabelled} pictures have no text file and are left out")
     return 0
 
 

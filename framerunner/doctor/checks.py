@@ -319,6 +319,12 @@ def _position(record: Record) -> Checks:
         yield good("position", f"by {source}, estimated accuracy {accuracy_m:.2f} m")
         return
     accuracy = f"estimated accuracy {accuracy_m:.1f} m" if isfinite(accuracy_m) else "unknown accuracy"
+    if _drifts(record, status):
+        text = (
+            f"by {source}, {accuracy}: it drifts; missions with `vision: frames` find their place themselves"
+        )
+        yield note("position", text, "framerunner doctor --walk 40 says how well it sees this floor")
+        return
     text = f"by {source}, {accuracy}: the drone will stray; a frame's opening is 0.38 m wide"
     yield missing("position", text, advice)
 
@@ -351,6 +357,9 @@ def _height(record: Record) -> Checks:
         advice = f"set EKF2_EV_CTRL to 15: {_GUIDE}"
     but = "" if source == requested else f", though EKF2_HGT_REF asks for {requested}"
     text = f"by {source}{but}, {accuracy}; in flight it drifts, and a frame's opening is 0.18 m high"
+    if _drifts(record, status) and "DISTANCE_SENSOR" in record.counts:
+        yield note("height", text, "missions with `vision: frames` find it themselves")
+        return
     yield missing("height", text, advice)
 
 
@@ -380,6 +389,13 @@ def _still(record: Record) -> Checks:
         yield note("estimate", text, f"see {_GUIDE}")
     else:
         yield good("estimate", f"still within {wander_m:.2f} m")
+
+
+def _drifts(record: Record, status: Message) -> bool:
+    """Whether the position is from optical flow, or another sensor that does not know where the drone is."""
+    relative = status.flags & mavlink.ESTIMATOR_PRED_POS_HORIZ_REL
+    absolute = status.flags & mavlink.ESTIMATOR_PRED_POS_HORIZ_ABS
+    return bool(relative and not absolute) and not _vision_in_use(record, status)
 
 
 def _vision_in_use(record: Record, status: Message) -> bool:

@@ -93,7 +93,7 @@ def _flight(batch: str, row: EvaluationRow, scenario: Scenario, replay: str) -> 
         total_time_s=row.total_time_s if row.completed else None,
         frames_crossed=tuple(row.frames_crossed),
         counts=dict(row.transitions),
-        track=_track(track),
+        track=_track(track.as_flown()),
         layout=scenario.model_dump(mode="json"),
         result=row.as_json(),
         replay=replay,

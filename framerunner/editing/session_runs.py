@@ -67,7 +67,7 @@ class KeptFlight:
             return
         try:
             if flown is not None:
-                recording.finish(flown.result, flown.track.time_s)
+                recording.finish(flown.result, flown.track)
             recording.close()
             if recording.problem:
                 self._give_up(recording.problem)

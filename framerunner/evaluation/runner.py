@@ -11,7 +11,7 @@ import threading
 import time
 import traceback
 import warnings
-from collections.abc import Coroutine, Generator, Iterable, Iterator
+from collections.abc import Coroutine, Generator, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -34,6 +34,7 @@ from framerunner.runs.recorder import RunRecords
 from framerunner.runs.run_folder import RunFolder
 from framerunner.runs.track import ChartRecord, Track
 from offboard.mission import Mission
+from scenarios.result import TimedPosition
 from scenarios.verdict import Verdict
 from sitl.temporary_folder import TemporaryFolder
 
@@ -341,7 +342,17 @@ def thinned(track: Track, step_s: float = TRACK_STEP_S) -> Track:
             kept.append(index)
     columns = ([round(column[index], 3) for index in kept] for column in (times, track.x, track.y, track.z))
     time_s, x, y, z = columns
-    return Track(time_s, x, y, z, [states[index] for index in kept], track.estimates)
+    true_path, estimated = (_thinned_path(path, step_s) for path in (track.true_path, track.estimated_path))
+    return Track(time_s, x, y, z, [states[index] for index in kept], track.estimates, true_path, estimated)
+
+
+def _thinned_path(path: Sequence[TimedPosition], step_s: float) -> list[TimedPosition]:
+    kept: list[TimedPosition] = []
+    for sample in path:
+        if not kept or sample[0] - kept[-1][0] >= step_s - 1e-6:
+            time_s, x, y, z = (round(value, 3) for value in sample)
+            kept.append((time_s, x, y, z))
+    return kept
 
 
 @dataclass(frozen=True, slots=True)

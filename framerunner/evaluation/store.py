@@ -237,10 +237,13 @@ def _track_as_dict(track: Track) -> dict[str, Any]:
         "states": states,
         "mission_state": [numbers[state] for state in track.mission_state],
         "estimates": [asdict(estimate) for estimate in track.estimates],
+        "true_path": track.true_path,
+        "estimated_path": track.estimated_path,
     }
 
 
 def _track_from_dict(data: dict[str, Any]) -> Track:
     states = [data["states"][number] for number in data["mission_state"]]
     estimates = _ESTIMATES.validate_python(data.get("estimates", ()))
-    return Track(data["time_s"], data["x"], data["y"], data["z"], states, estimates)
+    paths = ([tuple(sample) for sample in data.get(name, ())] for name in ("true_path", "estimated_path"))
+    return Track(data["time_s"], data["x"], data["y"], data["z"], states, estimates, *paths)

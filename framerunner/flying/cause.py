@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from dataclasses import dataclass, replace
-from math import degrees, dist, pi, remainder
+from math import degrees, dist, hypot, pi, remainder
 
 from framerunner.runs.track import Track
 from offboard.app import MissionEnd, Moment
@@ -16,6 +16,7 @@ from scenarios.result import FlightResult, RefereeReport
 from scenarios.verdict import Verdict
 
 SAME_GATE_M = 1.0  # an estimate of a gate's colour that is farther away is of something else
+PLACE_OFF_M = 0.05  # a place that is off by less is no cause
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +27,7 @@ class Flown:
         layout: the gates and obstacles where they truly were.
         report: of the referee.
         end: how the mission ended.
-        track: its times count from motors on.
+        track: its times count from motors on; with the true path, if that is known.
         began_us: vehicle time of motors on; None if they never were.
     """
 
@@ -58,7 +59,7 @@ class CauseWatch:
         if report.verdict is Verdict.WRONG_ORDER:
             parts.append(_wrong_order(flown))
         elif report.verdict is Verdict.CRASHED:
-            parts.append(f"crashed {_at(track, report.try_time_s)}")
+            parts.append(f"crashed {_at(track, report.try_time_s)}{_place_off(track, report.try_time_s)}")
             if flown.end.reason.startswith(STOPPED):  # other reasons follow from the crash
                 parts.append(flown.end.reason)
         elif report.completed and flown.end.ended == "aborted":  # it could land as it should, all the same
@@ -81,11 +82,16 @@ class CauseWatch:
             f", then {len(others)} more contacts" if len(others) > 1 else ", then one more" if others else ""
         )
         gate = next((gate for gate in flown.layout.frames if gate.colour == name), None)
-        known = "" if gate is None else self._error_of_map(gate, time_s, flown.began_us)
-        return f"touched {name} {_at(flown.track, time_s)}{known}{more}"
+        known = "" if gate is None else self._error_of_map(gate, time_s, flown)
+        off = known or _place_off(flown.track, time_s)
+        return f"touched {name} {_at(flown.track, time_s)}{off}{more}"
 
-    def _error_of_map(self, gate: Gate, time_s: float, began_us: int | None) -> str:
-        """How far the navigator's estimate of a gate was off at a time."""
+    def _error_of_map(self, gate: Gate, time_s: float, flown: Flown) -> str:
+        """How far the navigator's estimate of a gate was off at a time.
+
+        If the drone's place was off, the gate's is told from there: that error is common to both.
+        """
+        began_us, error_m = flown.began_us, flown.track.place_error_m(time_s)
         if began_us is None or not self._views:
             return ""
         number = bisect_right(self._views, began_us + round(time_s * 1e6), key=lambda seen: seen[0])
@@ -96,8 +102,14 @@ class CauseWatch:
         if nearest is None or dist(nearest.position_m, true_m) > SAME_GATE_M:
             return ", which was not on the map"
         off_deg = degrees(abs(remainder(nearest.yaw_rad - gate.yaw_rad, pi)))
-        off_cm = 100 * dist(nearest.position_m, true_m)
-        return f", which the map had {off_cm:.1f} cm and {off_deg:.1f}° off"
+        off_m = [believed - true for believed, true in zip(nearest.position_m, true_m, strict=True)]
+        if error_m is None or hypot(*error_m) < PLACE_OFF_M:
+            return f", which the map had {100 * hypot(*off_m):.1f} cm and {off_deg:.1f}° off"
+        from_drone_cm = 100 * dist(off_m, error_m)
+        return (
+            f"{_place_off(flown.track, time_s)}, and from there the map had {gate.colour} "
+            f"{from_drone_cm:.1f} cm and {off_deg:.1f}° off"
+        )
 
     def _hindrance(self, flown: Flown) -> str:
         """What the navigator lacked to cross the next gate or to fly home."""
@@ -136,15 +148,16 @@ def _outside(flown: Flown) -> str:
     if not flown.report.outside_s:
         return ""
     track, boundary = flown.track, Boundary(flown.layout.arena)
+    flown_path = track.as_flown().reported_path
     left_s = next(
         (
             time_s
-            for time_s, *place_m in zip(track.time_s, track.x, track.y, track.z, strict=True)
+            for time_s, *place_m in flown_path
             if boundary.margin((place_m[0], place_m[1], place_m[2])) < 0.0
         ),
         None,
     )
-    where = "" if left_s is None else f", first {_at(track, left_s)}"
+    where = "" if left_s is None else f", first {_at(track, left_s)}{_place_off(track, left_s)}"
     return f"outside the arena for {flown.report.outside_s:.2f} s{where}"
 
 
@@ -171,7 +184,7 @@ def _end(flown: Flown) -> str:
         index -= 1
     if end.ended == "timed out":
         return f"in {state} for the last {last_s - track.time_s[index]:.0f} s"
-    return f"the mission ended {_at(track, last_s)}"
+    return f"the mission ended {_at(track, last_s)}{_place_off(track, last_s)}"
 
 
 def _at(track: Track, time_s: float) -> str:
@@ -181,8 +194,17 @@ def _at(track: Track, time_s: float) -> str:
         return words
     index = _index_at(track, time_s)
     state = f" in {track.mission_state[index]}" if track.mission_state[index] else ""
-    x, y, z = track.x[index], track.y[index], track.z[index]
+    flown = track.as_flown()
+    x, y, z = flown.x[index], flown.y[index], flown.z[index]
     return f"{words}{state} at ({x:.2f}, {y:.2f}, {z:.2f})"
+
+
+def _place_off(track: Track, time_s: float) -> str:
+    """How far the place was off by which the drone was flown; empty if little, or not known."""
+    error_m = track.place_error_m(time_s)
+    if error_m is None or hypot(*error_m) < PLACE_OFF_M:
+        return ""
+    return f", the place being off by {100 * hypot(*error_m):.0f} cm"
 
 
 def _state_at(track: Track, time_s: float) -> str:

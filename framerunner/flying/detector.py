@@ -5,12 +5,14 @@ from __future__ import annotations
 from framerunner.flying.plan import FlightPlan
 from scenarios.imaging.effects import CameraEffects
 from scenarios.models import Base, Camera
-from vision.base.detector import DetectorWithBase
+from vision.base.detector import DetectorWithBase, FindsBase
 from vision.base.finder import BaseFinder
+from vision.base.markers import MarkerReader
 from vision.base.model import BaseShape
 from vision.calibration.lens import Lens
 from vision.calibration.model import Calibration
 from vision.detectors import Detector, DetectorMaker, new_detector, others_detector
+from vision.tracks.tracker import DetectorWithTracks, PointTracker
 
 
 def plan_detector(plan: FlightPlan) -> Detector:
@@ -34,16 +36,27 @@ def plan_detector(plan: FlightPlan) -> Detector:
 
 def _with_base(detector: Detector, plan: FlightPlan, calibration: Calibration) -> Detector:
     """A detector that looks for the base, too; a drone that starts from the floor has none."""
-    if plan.mission is None or plan.mission.vision == "boxes" or plan.lift_m:
+    if plan.mission is None or plan.mission.vision == "boxes":
         return detector
-    lens = None if calibration.is_ideal else Lens(calibration)
-    finder = BaseFinder(base_shape(plan.scenario.base), calibration.fx_px, lens)
-    return DetectorWithBase(detector, finder)
+    if plan.alone:
+        lens = None if calibration.is_ideal else Lens(calibration)
+        detector = DetectorWithTracks(detector, PointTracker(lens))
+    if plan.lift_m:
+        return detector
+    return DetectorWithBase(detector, base_finder(plan.scenario.base, calibration))
 
 
 def others_of(plan: FlightPlan) -> str | DetectorMaker | None:
     """The detector of others with which a plan's mission sees; None: it is one of ours."""
     return plan.detector or (None if plan.mission is None else plan.mission.detector or None)
+
+
+def base_finder(base: Base, calibration: Calibration) -> FindsBase:
+    """What looks for a scenario's base: by the markers on it if it has some, which hide its plain faces."""
+    lens = None if calibration.is_ideal else Lens(calibration)
+    if base.marker is not None:
+        return MarkerReader(base.marker.markers, base.edge_m, base.top_m, lens)
+    return BaseFinder(base_shape(base), calibration.fx_px, lens)
 
 
 def base_shape(base: Base) -> BaseShape:

@@ -10,6 +10,7 @@ from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import metadata
+from math import hypot
 from typing import Any
 
 from framerunner.flying.cause import CauseWatch, Flown
@@ -94,10 +95,13 @@ async def fly(
     why = None if outcome.ended == "finished" else outcome.reason
     report = await judge.report(outcome.mission_state, why)
     standing = await judge.standing()
-    track = recorder.track(began_us := None if standing is None else standing.began_us)
+    track = recorder.track(
+        began_us := None if standing is None else standing.began_us, true_path=judge.flown_path()
+    )
     more = {**fault_fields(await judge.faults(), report, plan.scenario.sensors), **measured()}
     cause = causes.words(Flown(plan.layout, report, outcome, track, began_us))
     more |= {"cause": cause, "judged_by": judge.source, **_bound(plan, report)}
+    more |= _place(track, report, recorder.largest_std_m)
     return FinishedFlight(_result(plan, report, outcome, track, measured=more), outcome, track, plan.layout)
 
 
@@ -153,6 +157,24 @@ def _bound(plan: FlightPlan, report: RefereeReport) -> dict[str, float | None]:
     least_s = bound_s(plan, plan.chart.mission_class)
     times = round(report.try_time_s / least_s, 3) if least_s and report.completed else None
     return {"bound_s": least_s, "times_bound": times}
+
+
+def _place(track: Track, report: RefereeReport, largest_std_m: float | None) -> dict[str, Any]:
+    """How exactly the drone's place was known, as far as that is known."""
+    deviation = {} if largest_std_m is None else {"largest_place_std_m": round(largest_std_m, 4)}
+    flown_by = track.estimated_path or track.reported_path
+    if not track.true_path or not flown_by:
+        return deviation
+    last_s = min(flown_by[-1][0], report.try_time_s)
+    errors_m = [track.place_error_m(time_s) for time_s in (*report.crossing_times_s, last_s)]
+    *at_crossings_m, last_m = (round(hypot(*error_m), 4) for error_m in errors_m if error_m is not None)
+    most_m = track.largest_error_m(track.reported_path)
+    return {
+        "place_errors_m": tuple(at_crossings_m),
+        "last_place_error_m": last_m,
+        **deviation,
+        **({} if most_m is None else {"largest_reported_error_m": round(most_m, 4)}),
+    }
 
 
 @cache

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 from dataclasses import replace
 from math import cos, sin
 from typing import TYPE_CHECKING
@@ -22,6 +23,7 @@ from scenarios.result import (
     RefereeSnapshot,
     Standing,
     StandingPlace,
+    TimedPosition,
     first_error,
 )
 
@@ -67,11 +69,19 @@ class Judge:
         """What failed in the flight; nothing if that is unknown."""
         return FaultFacts()
 
+    def flown_path(self) -> Sequence[TimedPosition]:
+        """Where the drone truly was, after `report`: seconds since motors on, arena metres; () if unknown."""
+        return self.referee.flown_path
+
 
 class TelemetryJudge(Judge):
     """A referee that sees the drone's telemetry, and so no contacts with gates."""
 
     source = "telemetry"
+
+    def flown_path(self) -> Sequence[TimedPosition]:
+        """Unknown."""
+        return ()
 
     def see(self, moment: Moment) -> None:
         """Show the drone's state to the referee."""
@@ -116,6 +126,7 @@ class TruthJudge(TelemetryJudge):
         self._api = api
         self._session = session
         self._latest: Standing | None = None
+        self._flown_path: Sequence[TimedPosition] = ()
 
     async def standing(self) -> RefereeSnapshot | None:
         """As of now, or None without a valid answer."""
@@ -136,7 +147,12 @@ class TruthJudge(TelemetryJudge):
         if answer is None or self._is_earlier(answer):
             self.source = TelemetryJudge.source
             return await super().report(mission_state, ended)
+        self._flown_path = answer.flown_path
         return answer.report
+
+    def flown_path(self) -> Sequence[TimedPosition]:
+        """As the simulator has told with its report."""
+        return self._flown_path
 
     async def faults(self) -> FaultFacts:
         """As the simulator tells, or has told last; nothing without a valid answer."""

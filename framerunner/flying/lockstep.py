@@ -115,7 +115,7 @@ class LockstepVehicle:
         detector = plan_detector(plan)
         feed = new_feed(plan.scenario, self.simulation.faults, plan.seed or 0)
         self.perception = LockstepPerception(
-            plan.scenario, on_image, detector, feed, remembers=others_of(plan) is not None
+            plan.scenario, on_image, detector, feed, remembers=others_of(plan) is not None or plan.alone
         )
         self.drone = LockstepDrone(
             self.simulation,
@@ -123,6 +123,7 @@ class LockstepVehicle:
             observers=(*observers, self.perception.follow),
             response=None if plan.response is None else LateResponse(plan.response, plan.seed or 0),
             limits=plan.velocity_limits(),
+            reports_place=plan.alone,
         )
 
 
@@ -164,6 +165,7 @@ class LockstepPerception:
         self._arrived: Exposure | None = None  # the latest, processed or not
         self._chosen: Exposure | None = None  # the latest to be processed, until it is
         self._untaken: deque[Exposure] = deque(maxlen=IMAGES_KEPT)
+        self._found: deque[Detections] = deque(maxlen=IMAGES_KEPT)  # processed, and not taken
         self._processed_us = -1
         self._detections = Detections()
         self._last: tuple[Image, Detections] | None = None  # the image that was processed last
@@ -197,7 +199,12 @@ class LockstepPerception:
             CameraSilentError: the last image is older than a second of vehicle time.
         """
         if self._chosen is not None:
-            self._detections = self._detect(self._chosen)
+            if self._remembers:  # it gets all images in their order
+                self._found.extend(map(self._detect, self._untaken))
+                self._untaken.clear()
+                self._detections = self._found[-1]
+            else:
+                self._detections = self._detect(self._chosen)
             self._processed_us, self._chosen = self._chosen.time_us, None
         image_us = 0 if self._arrived is None else self._arrived.time_us
         age_s = (time_us - image_us) / 1e6
@@ -207,9 +214,10 @@ class LockstepPerception:
 
     def take(self) -> tuple[Detections, ...]:
         """What each chosen image since the last call showed; `latest` has processed the last one already."""
-        images = tuple(self._untaken)
+        images, found = tuple(self._untaken), tuple(self._found)
         self._untaken.clear()
-        return tuple(
+        self._found.clear()
+        return found + tuple(
             self._detections if each.time_us == self._processed_us else self._detect(each) for each in images
         )
 

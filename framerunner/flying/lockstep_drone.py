@@ -18,6 +18,7 @@ from math import degrees, pi, radians
 from struct import Struct
 
 from firmware_py.autopilot import Autopilot
+from firmware_py.mavlink.external_pose import pose_of_odometry, usable_pose
 from firmware_py.mavlink.telemetry.motion import odometry
 from firmware_py.offboard_requests import SetpointRefusal, setpoint_from_body_velocity
 from firmware_py.status import CommandResult, FlightMode, LandedState
@@ -27,6 +28,7 @@ from framerunner.geometry.axes import ArenaAlignment, Pose, flip_vector
 from framerunner.geometry.rotations import normalized, quaternion_from_euler
 from framerunner.geometry.vectors import Vec3
 from framerunner.vehicle.measurements import ImuSample
+from framerunner.wire.dialect import Message
 from offboard.arming import Arming
 from offboard.drone import (
     DroneError,
@@ -39,6 +41,8 @@ from offboard.drone import (
 from offboard.limits import STILL, VelocityLimits
 from offboard.link.gimbal import GimbalAttitude
 from offboard.link.inertial import reported_accuracy
+from offboard.link.place_feedback import PERIOD_US as PLACE_US
+from offboard.link.place_feedback import PlaceFeedback
 from scenarios.models import TrueState
 from sitl.faults.link import LinkFault, Way
 from sitl.payload.gimbal import SimulatedGimbal
@@ -115,6 +119,7 @@ class LockstepDrone:
         telemetry_delay_us: see `TELEMETRY_DELAY_US`; ValueError if not below the 50 ms between ticks.
         response: the vehicle answers late; None: as its autopilot does.
         limits: of each command that is sent; None: there are none.
+        reports_place: the vehicle is sent where it is, at first where it stands.
     """
 
     gone = ""
@@ -128,12 +133,15 @@ class LockstepDrone:
         telemetry_delay_us: int = TELEMETRY_DELAY_US,
         response: LateResponse | None = None,
         limits: VelocityLimits | None = None,
+        reports_place: bool = False,
     ) -> None:
         if not 0 <= telemetry_delay_us < TICK_US:
             raise ValueError(f"telemetry_delay_us {telemetry_delay_us}: must be from 0 to below {TICK_US}")
         self._simulation = simulation
         self._autopilot = simulation.autopilot
         self._start_arena = Pose(start_arena[:3], start_arena[3])
+        self._feedback = PlaceFeedback(self._start_arena) if reports_place else None
+        self._feedback_us = POSITION_PHASE_US if reports_place else _NEVER_US
         self._observers = tuple(observers)
         self._delay_us = telemetry_delay_us
         self._response = response
@@ -274,6 +282,11 @@ class LockstepDrone:
         self._send(limited.command)
         return limited
 
+    def report_place(self, state: DroneState) -> None:
+        """See `Drone.report_place`."""
+        if self._feedback is not None and self._commanding:
+            _take_place(self._simulation, self._feedback.flying(state))
+
     async def close(self) -> None:
         """Stop commanding."""
         self._stop_commanding()
@@ -318,6 +331,7 @@ class LockstepDrone:
             self._tick_us,
             self._position_us,
             self._gimbal_us,
+            self._feedback_us,
         )
         while True:
             simulation.tick()
@@ -351,6 +365,12 @@ class LockstepDrone:
             if self._alignment is not None:
                 state = self._reported_state(self._alignment)
                 self._sample = self._link.receive(state) if self._link.active else state
+        if self._feedback is not None and self._simulation.time_us >= self._feedback_us:
+            self._feedback_us += PLACE_US  # a vehicle's clock stands until it knows its place
+            if self._feedback.stands:
+                _take_place(self._simulation, self._feedback.standing(self._simulation.time_us))
+            else:
+                self._feedback_us = _NEVER_US
         if now_us >= self._gimbal_us:
             self._gimbal_us += GIMBAL_US
             self._gimbal_attitude = _received_gimbal(self._simulation.gimbal)
@@ -407,6 +427,15 @@ class LockstepDrone:
             imu=tuple(imu),
             accuracy=self._received.accuracy,
         )
+
+
+def _take_place(simulation: Simulation, message: Message) -> None:
+    """Let the vehicle receive an ODOMETRY, whose time is that of its arrival."""
+    autopilot = simulation.autopilot
+    received = pose_of_odometry(message, simulation.time_us)
+    pose = usable_pose(received, message.quality, autopilot.parameters)
+    if pose is not None:
+        autopilot.estimator.take_external_pose(pose)
 
 
 def _received_imu(sample: ImuSample) -> ImuInterval:

@@ -198,7 +198,7 @@ class MissionReporter:
         is_busy = self._companion.is_sending(DocumentKind.MAP)
         if view is None or is_busy or not self._map_news.is_due(time_us):
             return
-        document = map_document(view, self._crc, time_us)
+        document = map_document(view, moment.place, mission_crc=self._crc, time_us=time_us)
         if self._map_news.take(document):
             self._send_document(DocumentKind.MAP, asdict(document))
 

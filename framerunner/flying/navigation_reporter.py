@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from math import isfinite
 
 from framerunner.geometry.vectors import Vec3
-from framerunner.wire.mission_report import MapDocument, MappedFrame
+from framerunner.wire.mission_report import EstimatedPlace, MapDocument, MappedFrame
+from offboard.drone import PlaceEstimate
 from offboard.navigation.view import GateEstimate, NavigationView
 
 MAX_GATES = 24  # of a map: with the path some 1.5 kB compressed
@@ -15,8 +16,10 @@ _MAX_TEXT = 80
 _MM = 3  # decimals of metres; of radians one more
 
 
-def map_document(view: NavigationView, mission_crc: int = 0, time_us: int = 0) -> MapDocument:
-    """A navigator's map and plan, as docs/monitor-channels.md has it.
+def map_document(
+    view: NavigationView, place: PlaceEstimate | None = None, *, mission_crc: int = 0, time_us: int = 0
+) -> MapDocument:
+    """A navigator's map and plan, and where it is by its own estimate, as docs/monitor-channels.md has it.
 
     Gates without a place are left out; an unknown standard deviation is None. A path of more points than
     `MAX_POINTS` has some of them left out.
@@ -24,7 +27,16 @@ def map_document(view: NavigationView, mission_crc: int = 0, time_us: int = 0) -
     gates = [_frame(gate) for gate in view.gates if has_place(gate)]
     points = [point for point in view.path_m if all(map(isfinite, point))]
     path = tuple(_rounded(point) for point in _thinned(points))
-    return MapDocument(mission_crc, time_us, view.goal[:_MAX_TEXT], tuple(gates[:MAX_GATES]), path)
+    return MapDocument(
+        mission_crc, time_us, view.goal[:_MAX_TEXT], tuple(gates[:MAX_GATES]), path, _estimated(place)
+    )
+
+
+def _estimated(place: PlaceEstimate | None) -> EstimatedPlace | None:
+    if place is None or not all(map(isfinite, (*place.position_m, *place.position_std_m))):
+        return None
+    std_m, yaw_std_rad = _rounded(place.position_std_m), round(place.yaw_std_rad, _MM + 1)
+    return EstimatedPlace(_rounded(place.position_m), round(place.yaw_rad, _MM + 1), std_m, yaw_std_rad)
 
 
 def has_place(gate: GateEstimate) -> bool:

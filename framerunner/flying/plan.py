@@ -15,6 +15,7 @@ from scenarios.imaging.effects import CameraEffects
 from scenarios.models import Camera, Scenario, start_position
 from scenarios.part import Part
 from scenarios.referee import Referee
+from sitl.sensors.suite import load_suite
 from vision.calibration.model import Calibration
 
 if TYPE_CHECKING:  # it imports the statechart library, which the virtual camera does not need
@@ -96,7 +97,14 @@ class FlightPlan:
     @property
     def surroundings(self) -> Surroundings:
         """What a navigator knows before the flight: all but the layout."""
-        return Surroundings(self.layout.arena, self.layout.base, self.camera, self.gate_shapes)
+        layout = self.layout
+        return Surroundings(layout.arena, layout.base, self.camera, self.gate_shapes, self.alone)
+
+    @cached_property
+    def alone(self) -> bool:
+        """Whether the drone knows its place only by what the app estimates with camera and IMU."""
+        pose = load_suite(self.scenario.sensors).external_pose
+        return pose is not None and pose.source == "app"
 
     @property
     def gate_shapes(self) -> GateShapes:

@@ -270,6 +270,7 @@ class _RealTimeFlight:
             corrects=plan.corrects_commands,
             system_id=system_id,
             when_hung=safety.abort,
+            reports_place=plan.alone,
         )
         drone.record_to(self._records.folder.tlog)
         self._stack.callback(lambda: warn(drone.recording_problem))

@@ -33,6 +33,7 @@ class SendSettings:
         position_sigma_m: standard deviation of each axis.
         attitude_sigma_rad: standard deviation about each axis.
         velocity_sigma_m_s: standard deviation of each axis.
+        height_sigma_m: standard deviation of the height; None: that of the other axes.
         origin: set in a vehicle that has none; None: nothing is set.
     """
 
@@ -42,6 +43,7 @@ class SendSettings:
     position_sigma_m: float = 0.005
     attitude_sigma_rad: float = 0.01
     velocity_sigma_m_s: float = 0.05
+    height_sigma_m: float | None = None
     origin: RoomOrigin | None = None
 
 

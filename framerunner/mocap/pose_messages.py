@@ -60,7 +60,10 @@ def vision_position(pose: MeasuredPose, stamp_us: int, settings: SendSettings) -
 
 
 def _pose_covariance(settings: SendSettings) -> list[float]:
-    return _covariance(settings.position_sigma_m**2, settings.attitude_sigma_rad**2)
+    entries = _covariance(settings.position_sigma_m**2, settings.attitude_sigma_rad**2)
+    if settings.height_sigma_m is not None:
+        entries[_DIAGONAL[2]] = settings.height_sigma_m**2
+    return entries
 
 
 def _covariance(first: float, second: float) -> list[float]:

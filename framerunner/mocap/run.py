@@ -105,6 +105,8 @@ def _report(console: Console, session: MocapSession, url: str, facts: Facts) -> 
         )
         return
     findings: list[Check] = judge(facts)
+    if session.source.failure:
+        console.print(session.source.failure, highlight=False, soft_wrap=True)
     vehicle = session.vehicle
     words = (
         f"Vehicle {vehicle.system_id} ({vehicle.autopilot_name}) on {url}, poses from {session.source.label}"

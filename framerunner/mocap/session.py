@@ -50,7 +50,8 @@ class MocapSession:
         zero_s: float = 0.0,
     ) -> None:
         self._link, self._source, self._settings, self._say = link, source, settings, say
-        self.vehicle = PoseVehicle(settings.rate_hz if source.needs_truth else 0.0, settings.origin, zero_s)
+        truth_hz = settings.rate_hz if source.needs_truth else 0.0
+        self.vehicle = PoseVehicle(truth_hz, settings.origin, zero_s, streams_hz=source.streams_hz)
         self.sent = self.dropouts = 0
         self.longest_gap_s = 0.0
         self.unused = Unused()

@@ -6,11 +6,13 @@ import socket
 import sys
 from abc import ABC, abstractmethod
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import cos, inf, isnan, radians
 from pathlib import Path
 from random import Random
 from subprocess import DEVNULL, PIPE, Popen, TimeoutExpired
+from types import MappingProxyType
 
 from framerunner.extras import install_advice, is_installed
 from framerunner.geometry.rotations import multiply, normalized
@@ -49,13 +51,17 @@ class PoseSource(ABC):
         ended: it will deliver nothing more.
         fault: what was wrong with data that it received last; empty: nothing was.
         faults: how often that happened.
+        failure: why it has ended; empty: it has not, or as it should.
         needs_truth: it is made from a simulated vehicle's true pose.
+        streams_hz: rates of messages, by their ids, of which it is made otherwise.
     """
 
     ended = False
     fault = ""
     faults = 0
+    failure = ""
     needs_truth = False
+    streams_hz: Mapping[int, float] = MappingProxyType({})
 
     def __init__(self, label: str) -> None:
         self.label = label

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from statistics import median
+from types import MappingProxyType
 
 from framerunner.mocap.dialects import PoseDialect, dialect_of
 from framerunner.mocap.facts import RoomOrigin
@@ -40,6 +41,7 @@ class PoseVehicle(Record):
         needs_truth_hz: a simulator's true pose is requested, so many a second; 0: it is not.
         origin: set while the vehicle is disarmed, if it has none; None: nothing is set.
         zero_s: reading of the clock of the time stamps at this program's time 0.
+        streams_hz: rates of further messages, by their ids.
 
     Attributes:
         answers: to its TIMESYNC requests, sent.
@@ -48,13 +50,19 @@ class PoseVehicle(Record):
     """
 
     def __init__(
-        self, needs_truth_hz: float = 0.0, origin: RoomOrigin | None = None, zero_s: float = 0.0
+        self,
+        needs_truth_hz: float = 0.0,
+        origin: RoomOrigin | None = None,
+        zero_s: float = 0.0,
+        *,
+        streams_hz: Mapping[int, float] = MappingProxyType({}),
     ) -> None:
         super().__init__(heartbeat="companion")
         self.answers = 0
         self.rates_rad_s: deque[tuple[int, float, float, float]] = deque(maxlen=2000)
         self.worst_ratio = 0.0
         self._truth_hz, self._origin, self._zero_s = needs_truth_hz, origin, zero_s
+        self._more_hz = streams_hz
         self._restarts = 0
         self._asked_origin = False  # a second ago, without an answer
         self._offsets: deque[tuple[float, float]] = deque(maxlen=_KEPT)  # round trip, offset
@@ -173,7 +181,7 @@ class PoseVehicle(Record):
     def _streams_hz(self) -> dict[int, float]:
         """Wanted rates, by message id."""
         truth = {self.dialect.truth: self._truth_hz} if self._truth_hz else {}
-        return {**self.dialect.streams_hz, **truth}
+        return {**self.dialect.streams_hz, **truth, **self._more_hz}
 
     @property
     def stream_counts(self) -> dict[int, int]:

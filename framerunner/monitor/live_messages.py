@@ -27,11 +27,15 @@ class World(TypedDict):
 
 
 class DronePose(TypedDict):
-    """Where a drone is: arena axes, metres, velocity forward, left, up, turn rate to the left."""
+    """Where a drone is: arena axes, metres, velocity forward, left, up, turn rate to the left.
+
+    `p` is as the vehicle reports; `truth` is where a simulated drone truly is, null if that is not known.
+    """
 
     id: int
     t: float
     p: Vector
+    truth: Vector | None
     q: tuple[float, float, float, float]
     v: Vector | None
     r: Number
@@ -158,8 +162,17 @@ class MappedFrame(TypedDict):
     size: tuple[float, float] | None
 
 
+class EstimatedPlace(TypedDict):
+    """Where an app itself has estimated its drone to be, with standard deviations."""
+
+    p: Vector
+    yaw: float
+    std: Vector
+    yaw_std: float
+
+
 class Map(TypedDict):
-    """What a navigator knows and plans."""
+    """What a navigator knows and plans; `place` is null if it believes what its vehicle reports."""
 
     kind: Literal["map"]
     id: int
@@ -167,6 +180,7 @@ class Map(TypedDict):
     goal: str
     frames: list[MappedFrame]
     path: list[Vector]
+    place: EstimatedPlace | None
 
 
 class Chart(TypedDict):

@@ -15,6 +15,7 @@ from framerunner.monitor.urls import is_for_others, terminal_code, url_of, urls_
 
 if TYPE_CHECKING:
     import uvicorn
+    from starlette.types import ASGIApp
 
     from framerunner.monitor.ports import Equipment
     from framerunner.monitor.server import Job
@@ -36,7 +37,7 @@ async def serve(equipment: Equipment, settings: MonitorSettings, say: Callable[[
     """
     settings.check()
     # First, so that a taken port is reported at once.
-    with _listen(settings.bind, settings.port) as listener:
+    with listen(settings.bind, settings.port) as listener:
         # Importing the libraries takes more than a second, so other tasks of this loop run meanwhile.
         await asyncio.to_thread(_import_server)
         from framerunner.monitor.server import assemble, make_server
@@ -80,7 +81,16 @@ async def serve(equipment: Equipment, settings: MonitorSettings, say: Callable[[
         await _run(server, listener, [monitor.fleet.run, *monitor.jobs])
 
 
-def _listen(bind: str, port: int) -> socket.socket:
+async def serve_web(
+    web: ASGIApp, settings: MonitorSettings, listener: socket.socket, started: Callable[[], None]
+) -> None:
+    """Serve a web application that is not the monitor's until cancelled; `started`: it listens."""
+    from framerunner.monitor.server import make_server
+
+    await _run(make_server(web, settings, started), listener, [])
+
+
+def listen(bind: str, port: int) -> socket.socket:
     """Open the listening socket; `MonitorError` if the port is taken or the address is of another machine."""
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(

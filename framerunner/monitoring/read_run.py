@@ -19,6 +19,8 @@ from pathlib import Path
 from typing import Any
 
 import cv2
+import numpy as np
+import numpy.typing as npt
 
 from framerunner.child_process import end_with_standard_input, limit_resources
 from framerunner.errors import UserError
@@ -152,6 +154,7 @@ def _image_size(flight: CollectedFlight, scenario: Scenario | None) -> tuple[int
 
 def _poses(flight: CollectedFlight, numbers: Mapping[str, int], clock: Clock) -> list[Json]:
     moments = [moment for moment in flight.moments if _has_pose(moment)]
+    true_m = _true_places(flight, moments)
     poses: list[Json] = []
     for number, moment in enumerate(moments):
         before, after = moments[max(0, number - 1)], moments[min(number + 1, len(moments) - 1)]
@@ -165,6 +168,7 @@ def _poses(flight: CollectedFlight, numbers: Mapping[str, int], clock: Clock) ->
             {
                 "t": clock(state.time_us),
                 "p": _rounded(state.x, state.y, state.z),
+                "truth": None if true_m is None else _rounded(*true_m[number]),
                 "q": _rounded(*state.attitude_arena),
                 "v": _rounded(c * vx + s * vy, c * vy - s * vx, vz),
                 "r": _rounded(turn_rad / span_s if span_s > 0 else 0.0)[0],
@@ -174,6 +178,16 @@ def _poses(flight: CollectedFlight, numbers: Mapping[str, int], clock: Clock) ->
             }
         )
     return poses
+
+
+def _true_places(flight: CollectedFlight, moments: Sequence[Moment]) -> npt.NDArray[np.float64] | None:
+    """Where a simulated drone truly was at some ticks, shape (n, 3); None if that is not known."""
+    if not flight.true_path:
+        return None
+    true_us = [each.time_us for each in flight.true_path]
+    at_us = [moment.state.time_us for moment in moments]
+    columns = np.array([each.position_m for each in flight.true_path]).T
+    return np.column_stack([np.interp(at_us, true_us, column) for column in columns])
 
 
 def _has_pose(moment: Moment) -> bool:
@@ -205,7 +219,7 @@ def _maps(moments: Sequence[Moment], clock: Clock) -> list[Json]:
         view = moment.navigation
         if view is not None and view is not last:
             last = view
-            content = map_document(view).as_json()
+            content = map_document(view, moment.place).as_json()
             if not found or {**content, "t": found[-1]["t"]} != found[-1]:
                 found.append({**content, "t": clock(moment.state.time_us)})
     return found

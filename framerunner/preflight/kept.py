@@ -8,7 +8,7 @@ Vehicle and fence are in comments, which QGroundControl skips.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -66,14 +66,20 @@ def write_kept(path: Path, system_id: int, kept: KeptState) -> None:
     if kept.fence is not None:
         lines.append(f"{_FENCE}\t{len(kept.fence)}")
         lines += [_item_line(item) for item in kept.fence]
-    lines.append(_HEADER)
-    for each in kept.parameters:
-        number = f"{each.value:.18g}" if each.kind == _FLOAT else f"{round(each.value)}"
-        lines.append(f"{system_id}\t{AUTOPILOT_COMPONENT_ID}\t{each.name}\t{number}\t{each.kind}")
+    lines += parameter_lines(system_id, kept.parameters)
     try:
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     except OSError as error:
         raise SettingError(f"{path}: cannot be written ({error.strerror}); nothing was set") from None
+
+
+def parameter_lines(system_id: int, parameters: Iterable[ParameterValue]) -> list[str]:
+    """The lines of a file with parameters of a vehicle."""
+    lines = [_HEADER]
+    for each in parameters:
+        number = f"{each.value:.18g}" if each.kind == _FLOAT else f"{round(each.value)}"
+        lines.append(f"{system_id}\t{AUTOPILOT_COMPONENT_ID}\t{each.name}\t{number}\t{each.kind}")
+    return lines
 
 
 def load_kept(path: Path) -> KeptState:

@@ -10,7 +10,7 @@ from typing import BinaryIO, cast
 import cv2
 import numpy as np
 
-from framerunner.recording.events import Crossed, Recorded, RecordedImage, RecordingError
+from framerunner.recording.events import Crossed, Recorded, RecordedImage, RecordingError, TruePlace
 from framerunner.recording.tlog_reader import MAX_TICKS, TlogRecording, motors_on_us
 from offboard.app import Moment
 from scenarios.result import FlightResult
@@ -89,6 +89,7 @@ class CollectedFlight:
         moments: every tick, in order of time; at least one.
         images: of the camera.
         crossings: of gates, in order of time.
+        true_path: where a simulated drone truly was, likewise; empty if that is not known.
         began_us: vehicle time of motors on, from which the referee counts, microseconds; of the first
             tick if the motors were never on.
         mission_is_known: whether states and commands are the mission's; a MAVLink log contains neither.
@@ -99,6 +100,7 @@ class CollectedFlight:
     moments: tuple[Moment, ...]
     images: ImageFile
     crossings: tuple[Crossed, ...]
+    true_path: tuple[TruePlace, ...]
     began_us: int
     mission_is_known: bool
 
@@ -118,6 +120,7 @@ def collect(recorded: Recorded, images: ImageFile | None = None) -> CollectedFli
     images = ImageFile() if images is None else images
     moments: list[Moment] = []
     crossings: list[Crossed] = []
+    true_path: list[TruePlace] = []
     for event in recorded.events():
         if isinstance(event, Moment):
             moments.append(event)
@@ -127,6 +130,8 @@ def collect(recorded: Recorded, images: ImageFile | None = None) -> CollectedFli
                 )
         elif isinstance(event, RecordedImage):
             images.add(event)
+        elif isinstance(event, TruePlace):
+            true_path.append(event)
         else:
             crossings.append(event)
     if not moments:
@@ -135,7 +140,14 @@ def collect(recorded: Recorded, images: ImageFile | None = None) -> CollectedFli
     began_us = _began_us(moments, crossings, {} if result is None else result.times_s)
     is_known = not isinstance(recorded, TlogRecording)
     return CollectedFlight(
-        recorded.title, result, tuple(moments), images, tuple(crossings), began_us, is_known
+        recorded.title,
+        result,
+        tuple(moments),
+        images,
+        tuple(crossings),
+        tuple(true_path),
+        began_us,
+        is_known,
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from framerunner.errors import UserError
+from framerunner.geometry.vectors import Vec3
 from offboard.app import Moment
 from scenarios.result import FlightResult
 from vision.types import Image
@@ -32,7 +33,15 @@ class Crossed:
     colour: str
 
 
-Event = Moment | RecordedImage | Crossed
+@dataclass(frozen=True, slots=True)
+class TruePlace:
+    """Where a simulated drone truly was, arena metres, at a vehicle time in microseconds."""
+
+    time_us: int
+    position_m: Vec3
+
+
+Event = Moment | RecordedImage | Crossed | TruePlace
 
 
 class Recorded(Protocol):

@@ -20,7 +20,7 @@ from mcap.writer import MCAP0_MAGIC
 from framerunner.geometry.gate_shape import GateShape
 from framerunner.geometry.rotations import quaternion_from_yaw
 from framerunner.geometry.vectors import Vec3
-from framerunner.recording.events import Crossed, Event, RecordedImage, RecordingError
+from framerunner.recording.events import Crossed, Event, RecordedImage, RecordingError, TruePlace
 from framerunner.recording.mcap_file import (
     MAX_CHUNK_BYTES,
     BoundedFile,
@@ -32,17 +32,19 @@ from framerunner.recording.mcap_writer import METADATA
 from framerunner.recording.schemas import (
     CROSSING,
     DETECTIONS,
+    ESTIMATE,
     IMAGE,
     MAP,
     MISSION,
     PATH,
     SETPOINT,
     TELEMETRY,
+    TRUTH,
 )
 from framerunner.runs.run_files import RESULT
 from framerunner.wire.mission_report import Plain, TransitionTaken, plain_value
 from offboard.app import Moment
-from offboard.drone import DroneState, VelocityFluCommand
+from offboard.drone import DroneState, PlaceEstimate, VelocityFluCommand
 from offboard.navigation.view import GateEstimate, NavigationView
 from scenarios.result import FlightResult, ResultError
 from vision.jpeg import JPEG_START, MAX_PIXELS, ImageError, jpeg_structure
@@ -99,7 +101,7 @@ class McapRecording:
         Raises:
             RecordingError: the file is damaged.
         """
-        topics = (TELEMETRY, SETPOINT, DETECTIONS, MISSION, IMAGE, CROSSING, MAP, PATH)
+        topics = (TELEMETRY, SETPOINT, DETECTIONS, MISSION, IMAGE, CROSSING, MAP, PATH, ESTIMATE, TRUTH)
         builder = _EventBuilder()
         try:
             for channel, message in messages(self._bounded, self._summary, topics):
@@ -159,11 +161,13 @@ class _EventBuilder:
         self._detections = Detections()
         self._transition: TransitionTaken | None = None
         self._navigation: NavigationView | None = None
+        self._place: PlaceEstimate | None = None
 
     def take(self, topic: str, time_us: int, message: Json) -> Event | None:
         """Add a message; telemetry is the last of a tick."""
         if topic == TELEMETRY:
             taken, self._transition = self._transition, None
+            place, self._place = self._place, None
             return Moment(
                 _drone_state(time_us, message),
                 self._command,
@@ -172,7 +176,10 @@ class _EventBuilder:
                 flight_time_s=float(message["flight_time_s"]),
                 transition=taken,
                 navigation=self._navigation,
+                place=place,
             )
+        if topic == TRUTH:
+            return TruePlace(time_us, _vector(message["position_arena_m"]))
         if topic == IMAGE:
             return RecordedImage(time_us, _decoded(b64decode(message["data"])))
         if topic == CROSSING:
@@ -185,6 +192,8 @@ class _EventBuilder:
         elif topic == MISSION:
             self._state = str(message["state"])
             self._transition = _transition(time_us, message)
+        elif topic == ESTIMATE:
+            self._place = _place(message)
         elif topic == MAP:
             gates = tuple(map(_gate_estimate, message["frames"][:_MAX_GATES]))
             view = self._navigation or NavigationView()
@@ -213,6 +222,18 @@ def _drone_state(time_us: int, message: Json) -> DroneState:
         bool(message["landed"]),
         float(message.get("position_age_s", 0.0)),
         quaternion_from_yaw(yaw_rad) if attitude is None else (float(attitude["w"]), *_vector(attitude)),
+    )
+
+
+def _place(message: Json) -> PlaceEstimate:
+    covariance_m2 = tuple(float(value) for value in message["position_covariance_m2"])
+    if len(covariance_m2) != 9 or min(covariance_m2[::4]) < 0.0:
+        raise RecordingError(f"a covariance of {ESTIMATE} is none")
+    return PlaceEstimate(
+        _vector(message["position_arena_m"]),
+        float(message["yaw_rad"]),
+        covariance_m2,
+        float(message["yaw_std_rad"]),
     )
 
 

@@ -7,7 +7,6 @@ compressed chunks of about a megabyte; at most one is in memory. Raw images are 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from importlib import metadata
 from pathlib import Path
@@ -19,6 +18,7 @@ from framerunner.files.text_file import read_text
 from framerunner.recording import recording_messages, schemas
 from framerunner.recording.events import RecordingError
 from framerunner.runs import run_files
+from framerunner.runs.track import Track
 from offboard.app import Moment
 from offboard.mission import Mission
 from offboard.navigation.view import NavigationView
@@ -92,6 +92,11 @@ class FlightRecording:
             self._detect(moment.detections, time_us)
         if moment.navigation is not None:
             self._navigate(moment.navigation, time_us)
+        if moment.place is not None:
+            self._write(schemas.ESTIMATE, time_us, recording_messages.estimate(moment.place, time_us))
+            self._write(
+                schemas.ESTIMATE_SCENE, time_us, recording_messages.estimate_scene(moment.place, time_us)
+            )
         self._write(schemas.SETPOINT, time_us, recording_messages.setpoint(moment))
         self._write(schemas.TRANSFORM, time_us, recording_messages.transform(moment.state))
         self._write(schemas.TELEMETRY, time_us, recording_messages.telemetry(moment))
@@ -121,18 +126,22 @@ class FlightRecording:
             self._size_px = (frame.image.shape[1], frame.image.shape[0])
             self._write(schemas.IMAGE, time_us, recording_messages.image(frame.jpeg, "jpeg", time_us))
 
-    def finish(self, result: FlightResult, track_time_s: Sequence[float]) -> None:
-        """Add what is known only after the flight: crossings, the verdict, and the result as an attachment.
+    def finish(self, result: FlightResult, track: Track) -> None:
+        """Add what is known only after the flight: crossings, the true path, the verdict, and the result.
 
         Args:
-            result: without wall times.
-            track_time_s: of the recorded ticks, since motors on.
+            result: without wall times; attached.
+            track: of the recorded ticks.
         """
         self._keep_compressed()
         end_us = self._now_us or 0
-        if self._first_us is not None and track_time_s:
-            began_us = self._first_us - round(track_time_s[0] * 1e6)
+        if self._first_us is not None and track.time_s:
+            began_us = self._first_us - round(track.time_s[0] * 1e6)
             self._cross_gates(result, began_us)
+            for time_s, *position_m in track.true_path:
+                x, y, z = position_m
+                time_us = began_us + round(time_s * 1e6)
+                self._write(schemas.TRUTH, time_us, recording_messages.truth((x, y, z), time_us))
             self._log(end_us, "referee", result.reason)
         self._attach(run_files.RESULT, "application/json", result.text(), end_us)
 

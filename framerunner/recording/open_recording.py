@@ -130,7 +130,7 @@ def _fly_again(files: RunFiles, result: FlightResult, path: Path, pilot: PilotSo
             flown = fly_lockstep(plan, observers=observers, on_image=recording.see_image)
         if flown.outcome.interrupted:
             raise KeyboardInterrupt
-        recording.finish(flown.result, flown.track.time_s)
+        recording.finish(flown.result, flown.track)
     if recording.problem:
         raise RecordingError(recording.problem)
     if flown.result.state_sha256 != result.state_sha256:

@@ -18,7 +18,7 @@ from framerunner.geometry.vectors import Quaternion, Vec3
 from framerunner.vehicle.airframe import load_airframe
 from framerunner.wire.mission_report import Plain
 from offboard.app import Moment
-from offboard.drone import DroneState
+from offboard.drone import DroneState, PlaceEstimate
 from offboard.navigation.view import GateEstimate, NavigationView
 from scenarios.imaging.effects import LensDistortion
 from scenarios.models import COLOURS, Arena, Scenario
@@ -45,6 +45,7 @@ _FLOOR = {"r": 0.88, "g": 0.69, "b": 0.22, "a": 0.6}
 _BORDER = {"r": 0.5, "g": 0.5, "b": 0.5, "a": 0.7}
 _BASE = {"r": 0.67, "g": 0.67, "b": 0.67, "a": 1.0}
 _PRISM = {"r": 0.47, "g": 0.27, "b": 0.71, "a": 0.6}  # poles and walls; what is behind them is seen too
+_ESTIMATE = {"r": 0.1, "g": 0.55, "b": 0.9, "a": 0.3}
 _BODY = {"r": 0.15, "g": 0.15, "b": 0.2, "a": 1.0}
 _NOSE = {"r": 1.0, "g": 0.6, "b": 0.0, "a": 1.0}
 _CLEAR = {"r": 0.0, "g": 0.0, "b": 0.0, "a": 0.0}
@@ -105,6 +106,28 @@ def _transform(time_us: int, frames: tuple[str, str], translation_m: Vec3, rotat
         "translation": _vector(translation_m),
         "rotation": rotation,
     }
+
+
+def estimate(place: PlaceEstimate, time_us: int) -> Message:
+    """Where the app itself has estimated the drone to be."""
+    return {
+        "timestamp": time_of(time_us),
+        "position_arena_m": _vector(place.position_m),
+        "yaw_rad": place.yaw_rad,
+        "position_covariance_m2": list(place.covariance_m2),
+        "yaw_std_rad": place.yaw_std_rad,
+    }
+
+
+def estimate_scene(place: PlaceEstimate, time_us: int) -> Message:
+    """That as a drawing: an ellipsoid of two standard deviations."""
+    ellipsoid = _ellipsoid(place.position_m, place.position_std_m, _ESTIMATE)
+    return {"deletions": [], "entities": [_entity(time_us, "estimate", ARENA, spheres=[ellipsoid])]}
+
+
+def truth(position_m: Vec3, time_us: int) -> Message:
+    """Where a simulated drone truly was."""
+    return {"timestamp": time_of(time_us), "position_arena_m": _vector(position_m)}
 
 
 def setpoint(moment: Moment) -> Message:
@@ -284,9 +307,14 @@ def _drawn_estimate(gate: GateEstimate) -> dict[str, list[Message]]:
     lines = [_lines(_dashes(loop) if not gate.certain else _pairs(loop), colour, 2.0)]
     if not all(map(isfinite, gate.position_std_m)):
         return {"lines": lines}
-    sigma_x, sigma_y, sigma_z = gate.position_std_m
-    sphere = _cube(gate.position_m, (4 * sigma_x, 4 * sigma_y, 4 * sigma_z), {**colour, "a": 0.25})
+    sphere = _ellipsoid(gate.position_m, gate.position_std_m, {**colour, "a": 0.25})
     return {"lines": lines, "spheres": [sphere]}
+
+
+def _ellipsoid(centre_m: Vec3, std_m: Vec3, colour: Message) -> Message:
+    """An ellipsoid of two standard deviations."""
+    x, y, z = std_m
+    return _cube(centre_m, (4 * x, 4 * y, 4 * z), colour)
 
 
 def _pairs(points: list[Vec3]) -> list[Vec3]:

@@ -11,7 +11,7 @@ from rich.live import Live
 from rich.table import Table
 
 from framerunner.flying.display import MomentLines, moment_table
-from framerunner.recording.events import Crossed, Recorded, time_of_event
+from framerunner.recording.events import Crossed, Recorded, RecordedImage, time_of_event
 from framerunner.terminal import say
 from offboard.app import Moment
 from sitl.pacing.pacer import Pacer
@@ -89,7 +89,7 @@ async def replay(recorded: Recorded, speed: float, video: VideoServer | None) ->
                     display.see(event)
                 elif isinstance(event, Crossed):
                     display.cross(event)
-                elif video is not None:
+                elif isinstance(event, RecordedImage) and video is not None:
                     video.publish(event.image, event.time_us)
     finally:
         if video is not None:

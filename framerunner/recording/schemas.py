@@ -25,6 +25,9 @@ CROSSING = "/crossing"
 MAP = "/map"
 MAP_SCENE = "/map/scene"
 PATH = "/path"
+ESTIMATE = "/estimate"
+ESTIMATE_SCENE = "/estimate/scene"
+TRUTH = "/truth"
 
 _Schema = dict[str, Any]
 
@@ -279,6 +282,20 @@ _OWN = (
         goal=_field("string", "what the navigator does, such as cross red"),
         frames=_array(_MAPPED_GATE),
     ),
+    _object(
+        "framerunner.Estimate",
+        timestamp=_TIME,
+        position_arena_m=_VECTOR_3,
+        yaw_rad=_field("number", "heading, counter-clockwise from the arena's x"),
+        position_covariance_m2={
+            **_array(_NUMBER),
+            "minItems": 9,
+            "maxItems": 9,
+            "description": "of x, y and z, row by row",
+        },
+        yaw_std_rad=_field("number", "standard deviation of the yaw"),
+    ),
+    _object("framerunner.Truth", timestamp=_TIME, position_arena_m=_VECTOR_3),
 )
 
 TOPICS = {
@@ -290,6 +307,9 @@ TOPICS = {
     MAP: "framerunner.Map",
     MAP_SCENE: "foxglove.SceneUpdate",
     PATH: "foxglove.PosesInFrame",
+    ESTIMATE: "framerunner.Estimate",
+    ESTIMATE_SCENE: "foxglove.SceneUpdate",
+    TRUTH: "framerunner.Truth",
     IMAGE: "foxglove.CompressedImage",
     CALIBRATION: "foxglove.CameraCalibration",
     ANNOTATIONS: "foxglove.ImageAnnotations",

@@ -6,7 +6,7 @@ state and need no display.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import cos, isfinite, nan, sin
 from pathlib import Path
 from textwrap import shorten
@@ -24,7 +24,7 @@ from framerunner.runs import PlotError, check_plot_format
 from framerunner.runs.track import Track
 from offboard.navigation.view import GateEstimate
 from scenarios.models import Gate, Scenario, UprightGate, start_position
-from scenarios.result import FlightResult
+from scenarios.result import FlightResult, TimedPosition
 
 _Dash = Literal["-"] | tuple[float, Sequence[float]]
 _Styles = Mapping[str, tuple[str, _Dash]]
@@ -67,6 +67,9 @@ _BASE = "#c9b892"
 _PRISM = "#7846b4"  # poles and walls
 _HALO = [withStroke(linewidth=2.5, foreground="white")]
 _CROSSING_MARK: dict[str, Any] = {"marker": "o", "ms": 5.5, "mfc": "white", "mec": _INK, "mew": 1.3}
+_REPORTED_PATH: dict[str, Any] = {"color": _FAINT, "lw": 0.9}
+_ESTIMATED_PATH: dict[str, Any] = {"color": _INK, "lw": 0.7}
+_SHOWN_ERROR_M = 0.05  # a path that is nearer to the true one than this is not drawn beside it
 _END_MARK: dict[str, Any] = {"marker": "X", "ms": 8, "mfc": _INK, "mec": "white"}
 
 
@@ -95,9 +98,13 @@ def draw_scenario(scenario: Scenario) -> Figure:
 def draw_track(scenario: Scenario, track: Track, result: FlightResult | None) -> Figure:
     """Return a flight from above and from the side, its path coloured by the mission's state.
 
+    The path is the true one where that is known; what the vehicle reported and what the app estimated are
+    thin lines, if they were somewhere else.
     The track may be empty; the result is None if the flight was not judged.
     """
     figure, top, side, notes = _new_figure()
+    asides = list(_paths_beside(track))
+    track = track.as_flown()
     times_s = {} if result is None else result.times_s
     _draw_top(top, scenario, {gate.colour: _crossing_label(gate, times_s) for gate in scenario.frames})
     _draw_side(side, scenario)
@@ -108,10 +115,14 @@ def draw_track(scenario: Scenario, track: Track, result: FlightResult | None) ->
         for i, kind in enumerate(spent_s)
     }
     for axes, view in ((top, _from_above), (side, _from_the_side)):
+        for path, style in asides:
+            axes.plot(*zip(*(view(x, y, z) for _, x, y, z in path), strict=True), **style, zorder=5)
         _draw_path(axes, view, track, styles)
         _draw_marks(axes, view, track, times_s)
     _set_limits(top, side, scenario, track)
-    _draw_legend(notes, spent_s, styles, has_estimates=bool(track.estimates))
+    _draw_legend(
+        notes, spent_s, styles, asides=[style for _, style in asides], has_estimates=bool(track.estimates)
+    )
     _write_title(figure, *_headline(scenario, result))
     return figure
 
@@ -319,6 +330,17 @@ def _draw_path(axes: Axes, view: _View, track: Track, styles: _Styles) -> None:
         axes.plot(*zip(*entries[kind], strict=True), ls="", marker="o", ms=3.6, color=colour, zorder=6)
 
 
+def _paths_beside(track: Track) -> Iterator[tuple[Sequence[TimedPosition], dict[str, Any]]]:
+    """What was reported and what was estimated, with their styles, where the truth is known and elsewhere."""
+    for path, words, style in (
+        (track.reported_path, "reported", _REPORTED_PATH),
+        (track.estimated_path, "estimated", _ESTIMATED_PATH),
+    ):
+        error_m = track.largest_error_m(path)
+        if error_m is not None and error_m > _SHOWN_ERROR_M:
+            yield path, {**style, "label": f"as {words}, up to {error_m:.2f} m off"}
+
+
 def _draw_marks(axes: Axes, view: _View, track: Track, times_s: Mapping[str, float]) -> None:
     """Mark the crossings and the end of the path."""
     for time_s in times_s.values():
@@ -357,7 +379,14 @@ def _limits(values: Sequence[float], low: float, high: float) -> tuple[float, fl
     )
 
 
-def _draw_legend(axes: Axes, spent_s: Mapping[str, float], styles: _Styles, *, has_estimates: bool) -> None:
+def _draw_legend(
+    axes: Axes,
+    spent_s: Mapping[str, float],
+    styles: _Styles,
+    *,
+    asides: Sequence[dict[str, Any]],
+    has_estimates: bool,
+) -> None:
     """Name the kinds of states in order of appearance, with the time spent in each, and the marks."""
     handles = []
     for kind, seconds in spent_s.items():
@@ -373,6 +402,7 @@ def _draw_legend(axes: Axes, spent_s: Mapping[str, float], styles: _Styles, *, h
         handles.append(
             Line2D([], [], color=_FAINT, lw=0.9, linestyle=_ESTIMATE_DASH, label="frame as estimated")
         )
+    handles += [Line2D([], [], **style) for style in asides]
     if not handles:
         axes.text(0, 0.95, "Nothing was recorded.", va="top", fontsize=10, color=_INK)
         return

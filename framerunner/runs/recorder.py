@@ -224,4 +224,4 @@ class RunRecords:
     def finish(self, result: FlightResult, track: Track) -> None:
         """Add the result to the recording."""
         if self.recording is not None:
-            self.recording.finish(result, track.time_s)
+            self.recording.finish(result, track)

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from math import isfinite
+
+import numpy as np
+import numpy.typing as npt
 
 from framerunner.geometry.vectors import Vec3
 from framerunner.wire.mission_report import TransitionTaken
 from offboard.app import Moment
 from offboard.navigation.view import GateEstimate
+from scenarios.result import TimedPosition
 
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """Where a drone was; all sequences but the last one have the same length.
+    """Where a drone was, as it reported; those before `estimates` have the same length.
 
     Attributes:
         time_s: since motors on, not decreasing, shape (n,).
@@ -25,6 +29,8 @@ class Track:
         z: see x.
         mission_state: the state's id at each sample, such as "red.turning"; "" where there is none.
         estimates: the gates as the navigator knew them at the end; empty without a navigator.
+        true_path: where a simulated drone truly was: seconds since motors on, arena metres; empty if unknown.
+        estimated_path: likewise, where the app itself has estimated it to be, at the ticks at which it has.
 
     Raises:
         ValueError: the sequences have different lengths.
@@ -36,6 +42,8 @@ class Track:
     z: Sequence[float] = ()
     mission_state: Sequence[str] = ()
     estimates: Sequence[GateEstimate] = ()
+    true_path: Sequence[TimedPosition] = ()
+    estimated_path: Sequence[TimedPosition] = ()
 
     def __post_init__(self) -> None:
         lengths = {name: len(getattr(self, name)) for name in ("time_s", "x", "y", "z", "mission_state")}
@@ -65,6 +73,41 @@ class Track:
             return (x, y, z)
         return None
 
+    def as_flown(self) -> Track:
+        """The same track with the true positions, as far as they are known."""
+        if not self.true_path:
+            return self
+        x, y, z = _along(self.true_path, self.time_s).T.tolist()
+        return replace(self, x=x, y=y, z=z)
+
+    @property
+    def reported_path(self) -> tuple[TimedPosition, ...]:
+        """The samples that are drawable."""
+        samples = zip(self.time_s, self.x, self.y, self.z, strict=True)
+        return tuple(sample for index, sample in enumerate(samples) if self.is_drawable(index))
+
+    def largest_error_m(self, path: Sequence[TimedPosition]) -> float | None:
+        """How far a path was from the true one at most, while that is known; None if it never is."""
+        true_path = self.true_path
+        known = [sample for sample in path if true_path and true_path[0][0] <= sample[0] <= true_path[-1][0]]
+        if not known:
+            return None
+        true_m = _along(self.true_path, [time_s for time_s, *_ in known])
+        return float(np.linalg.norm(np.array(known)[:, 1:] - true_m, axis=1).max())
+
+    def place_error_m(self, time_s: float) -> Vec3 | None:
+        """The place by which the drone was flown less the true one; None if that is not known.
+
+        That place is the estimated one or, at times at which there is none, the reported one.
+        """
+        path = self.estimated_path
+        if not path or not path[0][0] <= time_s <= path[-1][0]:
+            path = self.reported_path
+        if not path or not self.true_path:
+            return None
+        x, y, z = (_along(path, [time_s]) - _along(self.true_path, [time_s]))[0].tolist()
+        return (x, y, z)
+
     def stretches(self) -> Iterator[tuple[str, range]]:
         """Stretches flown in one kind of state, in order of time.
 
@@ -85,8 +128,19 @@ class Track:
         return spent_s
 
 
+def _along(path: Sequence[TimedPosition], times_s: Sequence[float]) -> npt.NDArray[np.float64]:
+    """Positions on a path at some times, interpolated linearly, shape (n, 3); outside it its ends."""
+    path_s, *path_m = np.array(path).T
+    return np.column_stack([np.interp(times_s, path_s, values) for values in path_m])
+
+
 class TrackRecorder:
-    """Records where the drone is at every tick of a flight."""
+    """Records where the drone is at every tick of a flight.
+
+    Attributes:
+        largest_std_m: standard deviation of the app's own estimate, of the coordinate known worst, when it
+            was largest; None if it has not estimated anything.
+    """
 
     def __init__(self) -> None:
         self._time_us: list[int] = []
@@ -95,6 +149,8 @@ class TrackRecorder:
         self._z: list[float] = []
         self._mission_state: list[str] = []
         self._estimates: Sequence[GateEstimate] = ()
+        self._places: list[tuple[int, Vec3]] = []
+        self.largest_std_m: float | None = None
 
     def see(self, moment: Moment) -> None:
         """Add a tick."""
@@ -106,13 +162,19 @@ class TrackRecorder:
         self._mission_state.append(moment.mission_state)
         if moment.navigation is not None:
             self._estimates = moment.navigation.gates
+        if moment.place is not None:
+            self._places.append((state.time_us, moment.place.position_m))
+            self.largest_std_m = max(self.largest_std_m or 0.0, *moment.place.position_std_m)
 
-    def track(self, began_us: int | None) -> Track:
+    def track(self, began_us: int | None, *, true_path: Sequence[TimedPosition] = ()) -> Track:
         """Return the track so far; times count from `began_us`, vehicle time, or from the first tick."""
         if began_us is None:
             began_us = self._time_us[0] if self._time_us else 0
         time_s = [(time_us - began_us) / 1e6 for time_us in self._time_us]
-        return Track(time_s, self._x, self._y, self._z, self._mission_state, self._estimates)
+        estimated = [((time_us - began_us) / 1e6, *position_m) for time_us, position_m in self._places]
+        return Track(
+            time_s, self._x, self._y, self._z, self._mission_state, self._estimates, true_path, estimated
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from math import atan2, cos, hypot, pi, radians, sin
 
 import numpy as np
 
-from framerunner.flying.detector import base_shape, true_calibration
+from framerunner.flying.detector import base_finder, true_calibration
 from framerunner.geometry.rotations import multiply, quaternion_from_euler, quaternion_from_yaw
 from framerunner.geometry.vectors import Quaternion, Vec3
 from framerunner.vision_evaluation.camera_chain import CLIP_IMAGES, CameraChain
@@ -18,8 +18,6 @@ from offboard.navigation.camera_model import CameraModel
 from scenarios.models import Scenario
 from scenarios.random_scenarios import Level, random_scenario
 from sitl.camera import SimulatedCamera
-from vision.base.finder import BaseFinder
-from vision.calibration.lens import Lens
 from vision.types import BaseExpectation, BaseSighting
 
 DISTANCES_M = (0.0, 1.0, 2.0, 3.0, 4.0, 6.0)
@@ -119,9 +117,7 @@ class _BaseView:
         self._scenario = scenario
         self.camera = SimulatedCamera(scenario, seed)
         self._model = CameraModel.of(scenario.camera)
-        calibration = true_calibration(scenario.camera)
-        lens = None if calibration.is_ideal else Lens(calibration)
-        self.finder = BaseFinder(base_shape(scenario.base), calibration.fx_px, lens)
+        self.finder = base_finder(scenario.base, true_calibration(scenario.camera))
 
     def draw_pose(self, stream: np.random.Generator) -> tuple[Vec3, Quaternion]:
         """A pose of the drone inside the arena, turned to the base."""

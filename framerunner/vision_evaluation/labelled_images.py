@@ -65,6 +65,8 @@ class GateLabel:
     """Of the middle plane, from the optical axis, as an ideal camera sees them; none if behind."""
     seen: bool  # a part of it may be in the image
     whole: bool  # all of it is in the image, and nothing is before it
+    opening_px: tuple[tuple[float, float], ...] = ()
+    """Corners of the opening, if it is by them that a detector is rated, in the same order and axes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import acos, degrees, hypot, inf
 from pathlib import Path
@@ -12,22 +13,26 @@ import cv2
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from framerunner.camera_calibration.calibration_file import load_calibration
+from framerunner.camera_calibration.calibration_file import load_calibration, save_calibration
 from framerunner.errors import SettingError
 from framerunner.files.text_file import TextError, read_bytes
 from framerunner.geometry.gate_shape import BAR_LIMITS_M, SIZE_LIMITS_M, GateShape, GateShapes
 from framerunner.vision_evaluation.labelled_images import GateLabel, LabelledImage
+from framerunner.vision_evaluation.openings import Corners, outline_of
+from framerunner.wire.finite_json import finite
 from vision.calibration.lens import Lens
 from vision.calibration.model import Calibration
-from vision.gate_model import GateModel, Point
+from vision.gate_model import GateModel
 from vision.gate_pose import as_seen, find_poses
 
-FILE = "labels.json"
+FILE, CALIBRATION = "labels.json", "camera.yaml"
 _MAX_BYTES = 100_000_000
+_DIGITS = 6
 _Size = Annotated[float, Field(ge=SIZE_LIMITS_M[0], le=SIZE_LIMITS_M[1])]
 _Bar = Annotated[float, Field(ge=BAR_LIMITS_M[0], le=BAR_LIMITS_M[1])]
 _Pixel = Annotated[float, Field(ge=-100_000, le=100_000)]
 _Place = tuple[_Pixel, _Pixel]
+LabelColour = Literal["red", "green", "blue", "cyan", "magenta"]
 
 
 class _Model(BaseModel):
@@ -37,9 +42,9 @@ class _Model(BaseModel):
 class LabelledGate(_Model):
     """A gate in a picture."""
 
-    colour: Literal["red", "green", "blue", "cyan", "magenta"]
+    colour: LabelColour
     corners: tuple[_Place, _Place, _Place, _Place] = Field(
-        description="column and row of the outer corners: upper left, upper right, lower right, lower left"
+        description="column and row of the corners: upper left, upper right, lower right, lower left"
     )
     whole: bool = Field(True, description="nothing of it is hidden or outside the picture")
 
@@ -51,11 +56,18 @@ class LabelledPicture(_Model):
     frames: tuple[LabelledGate, ...] = ()
 
 
-class _Shape(_Model):
+class PictureShape(_Model):
+    """Sizes of the gates."""
+
     outer_width_m: _Size = 0.42
     outer_height_m: _Size = 0.22
     bar_m: _Bar = 0.02
     depth_m: _Bar = 0.02
+
+    @property
+    def gate(self) -> GateShape:
+        """As a detector is told."""
+        return GateShape(self.outer_width_m, self.outer_height_m, self.bar_m, self.depth_m)
 
 
 class PictureLabels(_Model):
@@ -65,7 +77,10 @@ class PictureLabels(_Model):
     calibration: str | None = Field(
         None, description="file of `framerunner camera calibrate`, beside the labels"
     )
-    shape: _Shape = Field(_Shape(), description="of the gates")
+    shape: PictureShape = Field(PictureShape(), description="of the gates")
+    corners_of: Literal["outline", "opening"] = Field(
+        "outline", description="which corners of the gates are given; those are compared with a detector's"
+    )
     images: tuple[LabelledPicture, ...] = Field(min_length=1)
 
     @model_validator(mode="after")
@@ -73,6 +88,12 @@ class PictureLabels(_Model):
         if (self.focal_px is None) == (self.calibration is None):
             raise ValueError("give either focal_px or calibration")
         return self
+
+    def as_text(self) -> str:
+        """The file's text, a line for each picture."""
+        content = finite(self.model_dump(mode="json", exclude_none=True), _DIGITS)
+        images = ",\n  ".join(json.dumps(picture) for picture in content.pop("images"))
+        return f'{json.dumps(content, indent=1)[:-2]},\n "images": [\n  {images}\n ]\n}}\n'
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,8 +130,7 @@ class OwnPictures:
         Raises:
             SettingError: a picture cannot be read, or corners are those of no gate.
         """
-        size = self.labels.shape
-        shape = GateShape(size.outer_width_m, size.outer_height_m, size.bar_m, size.depth_m)
+        shape = self.labels.shape.gate
         for picture in self.labels.images:
             path = self.folder / picture.image
             image = cv2.imread(str(path), cv2.IMREAD_COLOR)
@@ -120,9 +140,7 @@ class OwnPictures:
             calibration = self.calibration or Calibration.ideal(width, height, self.labels.focal_px or 0.0)
             lens = Lens(calibration)
             lens.check_size(width, height)
-            gates = tuple(
-                _label(path, number, gate, shape, lens) for number, gate in enumerate(picture.frames)
-            )
+            gates = tuple(self._label(path, number, gate, lens) for number, gate in enumerate(picture.frames))
             yield LabelledImage(
                 image=np.asarray(image, np.uint8),
                 scenario=picture.image,
@@ -133,31 +151,48 @@ class OwnPictures:
                 shapes=GateShapes(other=shape),
             )
 
-
-def _label(path: Path, number: int, gate: LabelledGate, shape: GateShape, lens: Lens) -> GateLabel:
-    """What the corners of a gate tell of it; of two poses, the better one."""
-    columns, rows = lens.size_px
-    places = np.array(gate.corners) - np.array([(columns - 1) / 2, (rows - 1) / 2])
-    corners: list[Point] = [(x, y) for x, y in lens.ideal(places).tolist()]
-    outline = GateShape(
-        shape.outer_width_m + shape.bar_m, shape.outer_height_m + shape.bar_m, shape.bar_m, shape.depth_m
-    )  # whose bars' axes are where the outer corners of the gate are
-    poses = find_poses(corners, GateModel(outline, lens.focal_px), inf)
-    if not poses:
-        raise SettingError(
-            f"{path.parent / FILE}: {path.name}: frames.{number}.corners: no upright gate looks so; "
-            "give upper left, upper right, lower right, lower left"
+    def _label(self, path: Path, number: int, gate: LabelledGate, lens: Lens) -> GateLabel:
+        """What the corners of a gate tell of it; of two poses, the better one."""
+        given = given_corners(gate.corners, lens)
+        shape, of_opening = self.labels.shape.gate, self.labels.corners_of == "opening"
+        poses = find_poses(given, GateModel.of_corners(shape, lens.focal_px, of_opening=of_opening), inf)
+        if not poses:
+            raise SettingError(
+                f"{self.folder / FILE}: {path.name}: frames.{number}.corners: no upright gate looks so; "
+                "give upper left, upper right, lower right, lower left"
+            )
+        pose = as_seen(poses[0])
+        distance_m = hypot(*pose.position_flu_m)
+        along = -sum(a * b for a, b in zip(pose.position_flu_m, pose.normal_flu, strict=True)) / distance_m
+        return GateLabel(
+            colour=gate.colour,
+            distance_m=distance_m,
+            angle_deg=degrees(acos(max(-1.0, min(1.0, along)))),
+            position_flu_m=pose.position_flu_m,
+            normal_flu=pose.normal_flu,
+            corners_px=outline_of(given, shape) if of_opening else given,
+            seen=True,
+            whole=gate.whole,
+            opening_px=given if of_opening else (),
         )
-    pose = as_seen(poses[0])
-    distance_m = hypot(*pose.position_flu_m)
-    along = -sum(a * b for a, b in zip(pose.position_flu_m, pose.normal_flu, strict=True)) / distance_m
-    return GateLabel(
-        colour=gate.colour,
-        distance_m=distance_m,
-        angle_deg=degrees(acos(max(-1.0, min(1.0, along)))),
-        position_flu_m=pose.position_flu_m,
-        normal_flu=pose.normal_flu,
-        corners_px=tuple(corners),
-        seen=True,
-        whole=gate.whole,
-    )
+
+
+def keep_calibration(calibration: Calibration, folder: Path, source: str) -> str:
+    """Have a calibration in a folder of pictures; its name there.
+
+    Raises:
+        SettingError: the folder has another one, or cannot be written to. `source` names the calibration.
+    """
+    path = folder / CALIBRATION
+    if not path.exists():
+        save_calibration(calibration, path)
+    elif load_calibration(path) != calibration:
+        raise SettingError(f"{path}: is another calibration than {source}; remove one of them")
+    return CALIBRATION
+
+
+def given_corners(corners: Sequence[tuple[float, float]], lens: Lens) -> Corners:
+    """Corners in a picture, column and row, as pixels of an ideal camera from the optical axis."""
+    columns, rows = lens.size_px
+    places = np.array(corners) - np.array([(columns - 1) / 2, (rows - 1) / 2])
+    return tuple((x, y) for x, y in lens.ideal(places).tolist())

@@ -13,9 +13,10 @@ import numpy as np
 from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.vectors import Vec3
 from framerunner.vision_evaluation.labelled_images import GateLabel, LabelledImage
+from framerunner.vision_evaluation.openings import opening_of
 from vision.calibration.model import Calibration
 from vision.detectors import Detector, DetectorMaker, detector_name, new_detector, others_detector
-from vision.types import Detection, Detections, GateSighting, Image, Vision
+from vision.types import Detection, Detections, GateCorner, GateSighting, Image, Vision
 
 KINDS: tuple[Vision, ...] = ("boxes", "frames")
 DISTANCES_M = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0)
@@ -161,7 +162,7 @@ def _example(labelled: LabelledImage, detections: Detections) -> Example:
         for label in labelled.gates
         if label.whole
         and is_rated(label.distance_m, label.angle_deg)
-        and _sighting_of(label, detections.frames) is None
+        and _sighting_of(label, detections.frames, labelled.shapes) is None
     ]
     return Example(labelled, detections, tuple(missed), tuple(_false_alarms(labelled, detections)))
 
@@ -233,7 +234,8 @@ def _gates(labelled: LabelledImage, detections: Detections) -> tuple[list[Detect
     samples = []
     for label in labelled.gates:
         if label.whole:
-            samples.append(_sample_of_sighting(label, _sighting_of(label, detections.frames)))
+            sighting = _sighting_of(label, detections.frames, labelled.shapes)
+            samples.append(_sample_of_sighting(label, sighting, labelled.shapes))
     return samples, len(_false_alarms(labelled, detections))
 
 
@@ -260,32 +262,49 @@ def _is_near(sighting: GateSighting, label: GateLabel) -> bool:
     )
 
 
-def _sighting_of(label: GateLabel, sightings: Sequence[GateSighting]) -> GateSighting | None:
+def _sighting_of(
+    label: GateLabel, sightings: Sequence[GateSighting], shapes: GateShapes
+) -> GateSighting | None:
     """The sighting nearest to a gate, if it is of it."""
     best, best_px = None, _SAME_PX
     if label.corners_px:
         for sighting in sightings:
             if sighting.colour == label.colour:
-                pairs = zip(sighting.corners, label.corners_px, strict=True)
+                pairs = _compared(label, sighting, shapes)
                 off_px = max(
-                    hypot(seen.right_px - x, seen.down_px - y) for seen, (x, y) in pairs if seen is not None
+                    (hypot(seen.right_px - x, seen.down_px - y) for seen, (x, y) in pairs), default=inf
                 )
                 if off_px < best_px:
                     best, best_px = sighting, off_px
     return best
 
 
-def _sample_of_sighting(label: GateLabel, sighting: GateSighting | None) -> DetectionSample:
+def _compared(
+    label: GateLabel, sighting: GateSighting, shapes: GateShapes
+) -> list[tuple[GateCorner, tuple[float, float]]]:
+    """The corners of a sighting with those of a label: of the opening, if that is what is labelled."""
+    seen = [corner for corner in sighting.corners if corner is not None]
+    if label.opening_px and len(seen) == len(sighting.corners):
+        return list(zip(opening_of(seen, shapes.of(label.colour)), label.opening_px, strict=True))
+    return [
+        (corner, place)
+        for corner, place in zip(sighting.corners, label.corners_px, strict=True)
+        if corner is not None
+    ]
+
+
+def _sample_of_sighting(
+    label: GateLabel, sighting: GateSighting | None, shapes: GateShapes
+) -> DetectionSample:
     if sighting is None or not sighting.poses:
         return DetectionSample("frames", label.distance_m, label.angle_deg, False)
     tilts = [_angle_deg(pose.normal_flu, label.normal_flu) for pose in sighting.poses]
     best = tilts.index(min(tilts))
     pose = sighting.poses[best]
     deviations: list[float] = []
-    for corner, (right, down) in zip(sighting.corners, label.corners_px, strict=True):
-        if corner is not None:
-            deviations.append((corner.right_px - right) / corner.std_right_px)
-            deviations.append((corner.down_px - down) / corner.std_down_px)
+    for corner, (right, down) in _compared(label, sighting, shapes):
+        deviations.append((corner.right_px - right) / corner.std_right_px)
+        deviations.append((corner.down_px - down) / corner.std_down_px)
     return DetectionSample(
         "frames",
         label.distance_m,

@@ -163,19 +163,34 @@ class MappedFrame:
 
 
 @dataclass(frozen=True, slots=True)
+class EstimatedPlace:
+    """Where an app itself has estimated its drone to be, in arena axes, with standard deviations."""
+
+    p: _Point
+    yaw: _Radians
+    std: tuple[_Deviation, _Deviation, _Deviation]
+    yaw_std: _Deviation
+
+
+@dataclass(frozen=True, slots=True)
 class MapDocument:
-    """The MAP document: the navigator's goal, map and planned path."""
+    """The MAP document: the navigator's goal, map and planned path.
+
+    `place` is None if it believes what the vehicle reports; older apps do not tell it.
+    """
 
     mission_crc: Crc = 0
     time_us: TimeUs = 0
     goal: _Text = ""
     frames: Annotated[tuple[MappedFrame, ...], Field(max_length=50)] = ()
     path: Annotated[tuple[_Point, ...], Field(max_length=100)] = ()
+    place: EstimatedPlace | None = None
 
     def as_json(self) -> Json:
         """What it says, without mission and time."""
         frames = [asdict(each) for each in self.frames]
-        content: Json = finite({"goal": self.goal, "frames": frames, "path": self.path})
+        place = None if self.place is None else asdict(self.place)
+        content: Json = finite({"goal": self.goal, "frames": frames, "path": self.path, "place": place})
         return content
 
 

@@ -18,7 +18,7 @@ from framerunner.geometry.axes import flip_vector
 from framerunner.geometry.vectors import Vec3
 from framerunner.wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
 from framerunner.wire.vehicle_telemetry import MessageOrder
-from offboard.drone import ImuInterval, ReportedAccuracy
+from offboard.drone import SURE_OF_POSITION_M, ImuInterval, ReportedAccuracy
 from offboard.link.direct import subscribe
 
 RATE_HZ = 250.0  # requested; PX4 has 200 samples a second by itself
@@ -46,8 +46,8 @@ class InertialFeed:
 
     def subscribe(self, direct: Any) -> None:  # noqa: ANN401 - MAVSDK is untyped
         """Subscribe to MAVSDK's synchronous plugin `mavlink_direct`."""
-        subscribe(direct, "HIGHRES_IMU", self._on_imu)
-        subscribe(direct, "ODOMETRY", self._on_odometry)
+        subscribe(direct, "HIGHRES_IMU", self.take_imu)
+        subscribe(direct, "ODOMETRY", self.take_odometry)
 
     async def request(self, plugin: Any) -> None:  # noqa: ANN401
         """Request both, by MAVSDK's asyncio `telemetry`; a vehicle that refuses is flown as it reports.
@@ -60,6 +60,16 @@ class InertialFeed:
             with contextlib.suppress(MavsdkError):
                 await plugin.set_rate_odometry(ACCURACY_HZ)
 
+    @property
+    def drifts(self) -> bool:
+        """The vehicle is not sure of its position, and sends what the app needs to estimate it."""
+        accuracy = self.accuracy
+        return accuracy is not None and accuracy.position_std_m > SURE_OF_POSITION_M and self._has_no_gaps
+
+    @property
+    def _has_no_gaps(self) -> bool:
+        return 0.0 < self._usual_us <= LONGEST_US
+
     def take(self, until_us: int) -> tuple[ImuInterval, ...]:
         """The samples before a vehicle time since the last call, oldest first.
 
@@ -68,9 +78,10 @@ class InertialFeed:
         samples, taken = self._samples, []
         while samples and samples[0].time_us < until_us:
             taken.append(samples.popleft())
-        return tuple(taken) if 0.0 < self._usual_us <= LONGEST_US else ()
+        return tuple(taken) if self._has_no_gaps else ()
 
-    def _on_imu(self, message: Message) -> None:
+    def take_imu(self, message: Message) -> None:
+        """Take a HIGHRES_IMU."""
         if message.get_srcComponent() != AUTOPILOT_COMPONENT_ID or not self._order.is_next(message.time_usec):
             return
         last_us, self._last_us = self._last_us, message.time_usec
@@ -85,7 +96,8 @@ class InertialFeed:
         self._usual_us = usual_us + 0.1 * (min(period_us, 10 * LONGEST_US) - usual_us)
         self._samples.append(ImuInterval(message.time_usec, flip_vector(rate), flip_vector(force)))
 
-    def _on_odometry(self, message: Message) -> None:
+    def take_odometry(self, message: Message) -> None:
+        """Take an ODOMETRY."""
         is_autopilots = message.get_srcComponent() == AUTOPILOT_COMPONENT_ID
         if not is_autopilots or message.frame_id != mavlink.MAV_FRAME_LOCAL_NED:
             return

@@ -100,10 +100,16 @@ class ResetFeed:
         self._jumps.append(jump if known else None)
 
 
-def followed(alignment: ArenaAlignment, jump: Jump | None) -> ArenaAlignment:
+def followed(alignment: ArenaAlignment, jump: Jump | None, *, drifts: bool) -> ArenaAlignment:
     """The alignment after a reset: the drone has not moved, but its north may be another.
 
     A small change of the position is a correction within the frame, and stays one.
+
+    Args:
+        alignment: before it.
+        jump: the reset.
+        drifts: the vehicle is not sure of its position, and the app can estimate it. What it reports is then
+            continued from where the drone was.
 
     Raises:
         DroneError: where the drone is is not known any more.
@@ -112,15 +118,19 @@ def followed(alignment: ArenaAlignment, jump: Jump | None) -> ArenaAlignment:
         raise DroneError("the vehicle's estimator was reset, and by how much is not known")
     moved_m = dist(jump.expected.position_m, jump.reported.position_m)
     turned_rad = remainder(jump.reported.yaw_rad - jump.expected.yaw_rad, 2 * pi)
-    if moved_m > MAX_MOVE_M:
+    moves, turns = moved_m > MAX_MOVE_M, abs(turned_rad) >= MIN_TURN_RAD
+    if moves and not drifts:
         raise DroneError(f"the vehicle's estimator was reset, and moved its position by {moved_m:.1f} m")
-    if abs(turned_rad) < MIN_TURN_RAD:
+    if not (moves or turns):
         return alignment
     logger.warning(
-        "the vehicle's estimator has turned its north by %.0f°; the app follows", degrees(turned_rad)
+        "the vehicle's estimator was reset: north by %.0f°, its position by %.1f m; the app follows",
+        degrees(turned_rad),
+        moved_m,
     )
-    place = alignment.pose(Pose(jump.reported.position_m, jump.expected.yaw_rad))
-    return ArenaAlignment(place, jump.reported)
+    position_m = (jump.expected if moves else jump.reported).position_m
+    yaw_rad = (jump.expected if turns else jump.reported).yaw_rad
+    return ArenaAlignment(alignment.pose(Pose(position_m, yaw_rad)), jump.reported)
 
 
 def _report(message: Message) -> _Report:

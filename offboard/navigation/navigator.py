@@ -36,17 +36,19 @@ SEARCH_AFTER_M = 2.0  # from behind a gate to the drone, when it is chosen where
 
 
 class Navigator:
-    """The world model, the path, and the action that is flown. All positions are in arena axes.
+    """The world model, the path, and the action that is flown.
+
+    Positions are in the axes of flight: those of the arena, but continuous (`FlightAxes`).
 
     Attributes:
-        expected_base: see `WorldModel.expected_base`.
+        expected_base: see `Localization.expected_base`.
     """
 
     def __init__(self, surroundings: Surroundings, limits: CommandLimits = CONTEST) -> None:
         self._style = style_of(limits)
         self._camera = CameraModel.of(surroundings.camera)
         self._world = WorldModel(surroundings, self._style)
-        self.expected_base = self._world.expected_base
+        self.expected_base = self._world.localization.expected_base
         self._flight = PathFlight(surroundings.arena, self._style, limits)
         self._places = LookingPlaces(surroundings.arena, self._style)
         self._start_m: Vec3 | None = None
@@ -58,6 +60,7 @@ class Navigator:
         self._chosen_s = 0.0
         self._crossing: CrossingAttempt | None = None
         self._steps_back = 0
+        self._alone = surroundings.alone
         self._added_m_s: Vec3 = (0.0, 0.0, 0.0)  # to the command at the last tick
 
     def observe(
@@ -71,9 +74,10 @@ class Navigator:
             sent: the command that it has had since the last tick; None if it had none, or it is not known.
 
         Returns:
-            The drone's state as it is estimated now.
+            The drone's state as it is estimated now, in the arena. It is flown in the axes of flight.
         """
-        state = self._world.observe(state, images)
+        estimated = self._world.observe(state, images)
+        state = self._world.localization.state_in_flight(estimated)
         if sent is not None:
             sent = _plus(sent, [-v for v in self._added_m_s])
         self._added_m_s = (0.0, 0.0, 0.0)
@@ -81,7 +85,7 @@ class Navigator:
         self._state = state
         if self._start_m is None:
             self._start_m = position_now(state)
-        return state
+        return estimated
 
     def is_known(self, colour: str) -> bool:
         """The gate is on the map."""
@@ -101,7 +105,12 @@ class Navigator:
     def image_period_s(self) -> float:
         """In which one image is enough; 0: all are needed, in fast flight or near what is not certain."""
         state, crossing = self._state, self._crossing
-        if state is None or hypot(*state.velocity_arena_m_s) > SPACED_M_S or self._flight.looks:
+        if (
+            self._alone
+            or state is None
+            or hypot(*state.velocity_arena_m_s) > SPACED_M_S
+            or self._flight.looks
+        ):
             return 0.0
         if crossing is not None and self._action == f"cross {crossing.colour}":
             estimate = self._world.gate(crossing.colour)
@@ -155,12 +164,12 @@ class Navigator:
         """Fly to a point on a smooth path; to one on the base, when that was looked at if need be."""
         state, _ = self._begin("fly to goal")
         flight = self._flight
-        known = self._world.base_known(state.time_us - round(SIGHTINGS_S * 1e6))
+        known = self._world.localization.base_known(state.time_us - round(SIGHTINGS_S * 1e6))
         no_path = flight.path is None and flight.search is None and bool(flight.refusal)
         searched = self._way_home.searches
         goal = self._way_home.goal(goal_m, state, known, no_path=no_path)
         if self._way_home.searches and not searched:
-            self._world.doubt_place()
+            self._world.localization.doubt()
         if self._goal != goal:
             self._goal = goal
             flight.change()
@@ -169,6 +178,7 @@ class Navigator:
     def step_back(self, colour: str) -> VelocityFluCommand:
         """Fly back from a gate, to one of its sides, facing it."""
         state, _ = self._begin(f"step back from {colour}")
+        self._world.localization.stay_by(colour)
         if self._goal is None:
             gate, here_m = self._world.gate(colour), position_now(state)
             if gate is None:
@@ -185,6 +195,7 @@ class Navigator:
 
     def _cross(self, colour: str) -> VelocityFluCommand:
         state, now_s = self._begin(f"cross {colour}")
+        self._world.localization.stay_by(colour)
         crossing = self._crossing
         if crossing is None or crossing.colour != colour or crossing.refusal:
             crossing = self._crossing = CrossingAttempt(colour, now_s, now_s, now_s)
@@ -225,7 +236,7 @@ class Navigator:
 
     def _compensated(self, command: VelocityFluCommand) -> VelocityFluCommand:
         """What to command to a vehicle that is wrong about its velocity, so that it flies a command."""
-        added = self._world.velocity_error_flu_m_s
+        added = self._world.localization.velocity_error_flu_m_s
         if not any(added):
             return command
         self._added_m_s = added

@@ -11,12 +11,16 @@ from scenarios.models import Arena, Base, Camera
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """The arena, the base and the drone's camera; nothing about the gates but their shapes."""
+    """The arena, the base and the drone's camera; nothing about the gates but their shapes.
+
+    With `alone` the vehicle knows its place and its heading only by the app's estimate, which it is sent.
+    """
 
     arena: Arena
     base: Base
     camera: Camera
     shapes: GateShapes = field(default_factory=GateShapes)
+    alone: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Container, Sequence
 from math import hypot
 
 from framerunner.geometry.axes import Pose
@@ -16,14 +15,12 @@ from offboard.navigation.gates.gate_map import GateMap
 from offboard.navigation.goals import FlightStyle, Obstacles, PathGate
 from offboard.navigation.obstacle_map import ObstacleMap
 from offboard.navigation.planner.clearance import DRONE_RADIUS_M
-from offboard.navigation.pose_history import DronePose, PoseCorrection, PoseHistory
 from offboard.navigation.search.likelihood import Glimpses
 from offboard.navigation.seen_space import SeenSpace, ViewedSpace
 from offboard.navigation.view import GateEstimate, Surroundings
-from offboard.place.base_landmark import BaseLandmark
-from offboard.place.place import PlaceEstimator
+from offboard.place.localization import ImagePose, Localization
 from scenarios.models import COLOURS
-from vision.types import BaseExpectation, Detections
+from vision.types import Detections
 
 START_SPARE_M = 0.02  # by which what is known to be free at the start exceeds what the drone needs
 IMAGES_WAITING = 32  # for the drone's pose when they were exposed
@@ -33,6 +30,7 @@ class WorldModel:
     """Everything seen so far, in arena axes. Images are used at the drone's pose when they were exposed.
 
     Attributes:
+        localization: where the drone is.
         seen_space: where nothing stands.
         viewed_space: where a gate would have been seen.
     """
@@ -40,9 +38,7 @@ class WorldModel:
     def __init__(self, surroundings: Surroundings, style: FlightStyle) -> None:
         camera = self._camera = CameraModel.of(surroundings.camera)
         self._surroundings = surroundings
-        self._history = PoseHistory(camera)
-        self._place = PlaceEstimator(camera, surroundings.shapes)
-        self._base = BaseLandmark(camera, surroundings.base)
+        self.localization = Localization(surroundings)
         self._map = GateMap(camera, surroundings.arena, surroundings.shapes)
         self._obstacle_map = ObstacleMap(camera, surroundings.arena)
         self.seen_space = SeenSpace(camera, surroundings.arena)
@@ -54,6 +50,7 @@ class WorldModel:
         self._image_us = -1
         self._waiting: deque[Detections] = deque(maxlen=IMAGES_WAITING)
         self._known: dict[str, GateEstimate] = {}  # by colour
+        self._in_flight: dict[str, GateEstimate] = {}  # likewise, in the axes of flight
         self._gates: tuple[PathGate, ...] | None = None  # that a path must keep clear of; None: not made yet
 
     def observe(self, state: DroneState, images: Sequence[Detections]) -> DroneState:
@@ -65,12 +62,10 @@ class WorldModel:
         Returns:
             The state now, by all that is known.
         """
-        self._place.add(state)
+        localization = self.localization
+        localization.add(state)
         if self._start_m is None:
             self._start_m = (state.x, state.y, state.z)
-        for earlier in state.missed:
-            self._history.add(earlier)
-        self._history.add(state)
         for image in images:
             if image.time_us is not None and image.time_us > self._image_us:
                 self._image_us = image.time_us
@@ -78,45 +73,31 @@ class WorldModel:
         waiting = self._waiting
         read_us = state.time_us - round(0.5e6 * self._camera.readout_s)  # images are read out by now
         while waiting and (image_us := waiting[0].time_us) is not None and image_us <= read_us:
-            is_there = self._place.advance(image_us)
-            correction = self._place.correction(image_us)
-            pose = self._history.at(image_us, correction)
-            image = waiting.popleft()
-            if pose is not None:
-                self._use(image, pose, correction if is_there else None)
-        self._place.advance()
-        if self._place.estimates:
-            self._know()
-        return self._place.state(state)
+            image, at = waiting.popleft(), localization.pose_of(image_us)
+            if at is not None:
+                self._use(image, at)
+        in_filter = localization.finish(state.time_us)
+        if in_filter is not None:
+            self._know(in_filter)
+        return localization.state(state)
 
-    def _know(self) -> None:
+    def _know(self, in_filter: Container[str]) -> None:
         """Note what is known of each gate now, relative to the drone."""
         best = [estimate for estimate in map(self._map.best, COLOURS) if estimate is not None]
-        known = {estimate.colour: self._place.known(estimate) for estimate in best}
-        if known != self._known:
-            self._known, self._gates = known, None
+        self._known = {estimate.colour: self.localization.known(estimate) for estimate in best}
+        in_flight = {
+            colour: self.localization.gate_in_flight(known) if colour in in_filter else known
+            for colour, known in self._known.items()
+        }
+        if in_flight != self._in_flight:
+            self._in_flight, self._gates = in_flight, None
 
-    @property
-    def velocity_error_flu_m_s(self) -> Vec3:
-        """See `PlaceEstimator.velocity_error_flu_m_s`."""
-        return self._place.velocity_error_flu_m_s
-
-    def _use(self, image: Detections, pose: DronePose, correction: PoseCorrection | None) -> None:
-        """Use an image.
-
-        Args:
-            image: what it showed.
-            pose: of the drone when it was exposed.
-            correction: of that pose, if the image can correct the drone's place.
-        """
-        position_m, attitude = pose.position_m, pose.attitude_arena
+    def _use(self, image: Detections, at: ImagePose) -> None:
+        position_m, attitude = at.pose.position_m, at.pose.attitude_arena
         self._gates = None
-        poses = self._poses_of_rows(image, pose)
-        self._map.observe(image, pose, poses)
-        if correction is not None:
-            poses = [pose] * len(image.frames) if poses is None else poses
-            self._place.see(image.frames, poses, correction, self._map)
-            self._see_base(image, pose, correction)
+        poses = self.localization.poses_of_rows(image, at.pose)
+        self._map.observe(image, at.pose, poses)
+        self.localization.use(image, at, poses, self._map)
         self._obstacle_map.update(position_m, attitude, image.obstacle_edges)
         self.seen_space.update(position_m, attitude, image.obstacle_edges)
         self._explorer.coverage.update(position_m, attitude, image.obstacle_edges)
@@ -126,56 +107,16 @@ class WorldModel:
         self.viewed_space.needed = others or len(known) < len(COLOURS)
         self._glimpses.update(position_m, attitude, image, known, self._map.is_lookalike)
 
-    def _see_base(self, image: Detections, pose: DronePose, correction: PoseCorrection) -> None:
-        sighting, base = image.base, self._base
-        if sighting is None:
-            return
-        at_us = pose.time_us + round(1e6 * self._camera.read_after_s(base.row_px(sighting)))
-        pose = self._history.at(at_us, self._place.correction(at_us)) or pose
-        if self._place.see_points(base.points_m(sighting), sighting, pose, correction):
-            base.seen_us.append(pose.time_us)
-
-    def expected_base(self, time_us: int) -> BaseExpectation | None:
-        """Where the base is to be looked for in an image; None if it need not be, or is out of view."""
-        std = self._place.std
-        pose = None if std is None else self._history.at(time_us, self._place.correction(time_us))
-        return None if std is None or pose is None else self._base.expected(pose, std)
-
-    def base_known(self, since_us: int) -> tuple[int, float] | None:
-        """How often the base was seen since a time, and how well the place is known in plan, metres.
-
-        None: the vehicle knows its place, so the base need not be looked at.
-        """
-        std = self._place.std
-        return None if std is None else (self._base.sightings(since_us), float(std[:2].max()))
-
-    def doubt_place(self) -> None:
-        """See `PlaceEstimator.doubt`."""
-        self._place.doubt()
-
-    def _poses_of_rows(self, image: Detections, pose: DronePose) -> list[DronePose] | None:
-        """With a rolling shutter, the drone's pose when each gate's middle row was read out."""
-        if self._camera.readout_s == 0.0:
-            return None
-        poses = []
-        for sighting in image.frames:
-            rows = [corner.down_px for corner in sighting.corners if corner is not None]
-            after_s = self._camera.read_after_s(sum(rows) / len(rows)) if rows else 0.0
-            at_us = pose.time_us + round(1e6 * after_s)
-            at = self._history.at(at_us, self._place.correction(at_us))
-            poses.append(pose if at is None else replace(at, time_us=pose.time_us))
-        return poses
-
     def gate(self, colour: str) -> GateEstimate | None:
-        """The gate of a colour; None if it is not on the map."""
+        """The gate of a colour in the axes of flight; None if it is not on the map."""
         known = self._map.best(colour)
-        return known if known is None else self._known.get(colour, known)
+        return known if known is None else self._in_flight.get(colour, known)
 
     @property
     def gates(self) -> tuple[GateEstimate, ...]:
-        """All gates on the map."""
+        """All gates on the map, in the arena."""
         return tuple(
-            self.gate(gate.colour) or gate if gate is self._map.best(gate.colour) else gate
+            self._known.get(gate.colour, gate) if gate is self._map.best(gate.colour) else gate
             for gate in self._map.gates
         )
 

@@ -14,6 +14,7 @@ from scenarios.models import Base
 from vision.types import BaseExpectation, BaseSighting
 
 FARTHEST_M = 3.6  # from there it is some pixels only, and a cube turned otherwise looks the same
+MARKER_PX = 8.0  # a marker is read as long as it is so wide
 SPACED_US = 250_000  # between two images in which it is looked for: what is common to an edge is so to both
 NEAR_M, NEAR_SPACED_US = 2.5, 140_000  # likewise near it, before a landing
 LEAST_STD_M, LEAST_STD_RAD = 0.06, 0.015
@@ -38,6 +39,8 @@ class BaseLandmark:
         self.seen_us: deque[int] = deque(maxlen=SEEN_KEPT)
         self._camera, self._base = camera, base
         self._looked_us: int | None = None
+        marker_m = 0.0 if base.marker is None else base.marker.edge_m
+        self._farthest_m = max(FARTHEST_M, camera.focal_px * marker_m / MARKER_PX)
         half_m = base.edge_m / 2
         self._corners_m = [
             (base.x_m + x, base.y_m + y, z)
@@ -58,7 +61,7 @@ class BaseLandmark:
         away_m = hypot(x - base.x_m, y - base.y_m)
         spaced_us = NEAR_SPACED_US if away_m < NEAR_M else SPACED_US
         looked_us = self._looked_us
-        if away_m > FARTHEST_M or (looked_us is not None and 0 <= pose.time_us - looked_us < spaced_us):
+        if away_m > self._farthest_m or (looked_us is not None and 0 <= pose.time_us - looked_us < spaced_us):
             return None
         seen = [self._camera.project(camera, corner) for corner in self._corners_m]
         inside = [one for one in seen if one is not None and self._camera.contains(*one, -MARGIN_PX)]

@@ -5,8 +5,9 @@ Each function gives the measurement's model: residual, Jacobian and noise at a s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import cos, inf, sin
+from math import cos, exp, inf, sin
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from framerunner.geometry.vectors import Quaternion, Vec3
 from offboard.navigation.camera_model import NEAREST_M, CameraModel
 from offboard.navigation.gates.gate_measurement import GateView, predicted
 from offboard.navigation.pose_history import turned_by
-from offboard.place.place_filter import OWN, POSITION, TURN, Floats, Measurement, Model
+from offboard.place.place_filter import OWN, POSE, POSITION, SIZE, TURN, Floats, Measurement, Model
 
 PLACE_STD_M = 0.0005  # of the camera on the drone
 
@@ -63,6 +64,18 @@ def report(
     return at
 
 
+def height(height_m: float, std_m: float) -> Model:
+    """The height above the arena's floor."""
+    noise = np.array(((std_m**2,),))
+
+    def at(state: Floats) -> Measurement:
+        jacobian = np.zeros((1, len(state)))
+        jacobian[0, 2] = 1.0
+        return Measurement(np.array((height_m - state[2],)), jacobian, noise)
+
+    return at
+
+
 def stands(position_m: Vec3, turn_rad: float, std_m: float, turn_std_rad: float, std_m_s: float) -> Model:
     """A drone at rest, whose place and heading are known: position, turn and velocity."""
     known = np.array((*position_m, turn_rad, 0.0, 0.0, 0.0))
@@ -71,6 +84,23 @@ def stands(position_m: Vec3, turn_rad: float, std_m: float, turn_std_rad: float,
     def at(state: Floats) -> Measurement:
         jacobian = np.eye(len(known), len(state))
         return Measurement(known - state[: len(known)], jacobian, noise)
+
+    return at
+
+
+def size(first: int, std: float) -> Model:
+    """A gate has the size of its shape.
+
+    Args:
+        first: index of the gate in the state.
+        std: standard deviation of the logarithm of its size.
+    """
+    noise = np.array(((std * std,),))
+
+    def at(state: Floats) -> Measurement:
+        jacobian = np.zeros((1, len(state)))
+        jacobian[0, first + SIZE] = 1.0
+        return Measurement(-state[first + SIZE : first + SIZE + 1], jacobian, noise)
 
     return at
 
@@ -97,31 +127,43 @@ class Eye:
         px, py, pz = state[POSITION].tolist()
         return (px + c * x - s * y, py + s * x + c * y, pz + z), turned_by(float(state[TURN]), self.attitude)
 
+    def sees(self, state: Floats, point_m: Sequence[float]) -> bool:
+        """Whether a point in the arena is in the image, where a state has the camera."""
+        x, y, z = point_m
+        seen = self.model.project(self.model.pose(*self.place(state)), (x, y, z))
+        return seen is not None and self.model.contains(*seen, 0.0)
 
-def corners(view: GateView, eye: Eye, first: int, yaw_var_rad2: float) -> Model:
+
+def corners(view: GateView, eye: Eye, first: int, seen_from_m: Floats, yaw_var_rad2: float) -> Model:
     """The corners of a gate in an image.
 
-    The linear part of a function of the yaw leaves out the square (second-order filter; Athans et al., 1968).
+    One larger than its shape looks like one that is nearer, and moves along with the drone. The linear
+    part of a function of the yaw leaves out the square (second-order filter; Athans et al., 1968).
 
     Args:
         view: what was seen.
         eye: from where.
         first: index of the gate in the state.
+        seen_from_m: see `PlaceFilter`.
         yaw_var_rad2: variance of the gate's yaw.
     """
 
     def at(state: Floats) -> Measurement | None:
         place_m, attitude = eye.place(state)
-        here = replace(view, camera=eye.model.pose(place_m, attitude))
-        expected = predicted(state[first : first + 4], here)
+        camera = eye.model.pose(place_m, attitude)
+        gate = state[first : first + POSE].copy()
+        kept, since_m = exp(-float(state[first + SIZE])), place_m - seen_from_m
+        gate[:3] += (1.0 - kept) * since_m
+        expected = predicted(gate, replace(view, camera=camera))
         if expected is None:
             return None
         corners_px, by_gate, curvature = expected
         moved = by_gate[:, :3]
         jacobian = np.zeros((len(corners_px), len(state)))
-        jacobian[:, first : first + 4] = by_gate
-        jacobian[:, POSITION] = -moved
-        x, y, _ = state[first : first + 3] - state[POSITION]
+        jacobian[:, first : first + POSE] = by_gate
+        jacobian[:, first + SIZE] = kept * moved @ since_m
+        jacobian[:, POSITION] = -kept * moved
+        x, y, _ = gate[:3] - place_m + kept * (place_m - state[POSITION])
         jacobian[:, TURN] = moved @ (y, -x, 0.0) - by_gate[:, 3]
         noise = (
             view.noise_px2

@@ -16,7 +16,7 @@ import numpy as np
 
 from framerunner.geometry.gate_shape import GateShapes
 from framerunner.geometry.vectors import Vec3, turned
-from offboard.drone import DroneState, ReportedAccuracy
+from offboard.drone import SURE_OF_POSITION_M, DroneState, PlaceEstimate, ReportedAccuracy
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.gates.gate_map import GateMap
 from offboard.navigation.gates.gate_measurement import GateView, view_of
@@ -24,12 +24,20 @@ from offboard.navigation.pose_history import DronePose, PoseCorrection, turned_b
 from offboard.navigation.view import GateEstimate
 from offboard.place.inertial_track import InertialTrack
 from offboard.place.landmarks import GateLandmarks
-from offboard.place.measurements import Eye, points, report, stands
-from offboard.place.place_filter import POSITION, TURN, VELOCITY, Floats, PlaceFilter
-from vision.types import BaseSighting, GateSighting
+from offboard.place.measurements import Eye, height, points, report, stands
+from offboard.place.place_filter import (
+    POSITION,
+    TURN,
+    TURN_RAD,
+    TURN_SETTLING_RAD,
+    VELOCITY,
+    Floats,
+    PlaceFilter,
+)
+from offboard.place.point_tracks import PointWindow
+from vision.types import BaseSighting, GateSighting, PointTracks
 
-# A place that is known no better than this, or this many times worse than at the start, is not known.
-SURE_M = 0.1
+# A place that is known so many times worse than at the start is not known, if it is known worse than this.
 SURE_FACTOR = 2.0
 ALWAYS_SURE_M = 0.01
 SURE_RAD = 0.02
@@ -47,6 +55,7 @@ ERROR_S = 2.0
 LEAST_POSITION_STD_M = 0.005
 LEAST_VELOCITY_STD_M_S = 0.03
 LEAST_HEIGHT_STD_M = 0.05
+HEIGHT_FACTOR = 2.0  # a height farther off than so many deviations is known less well than the vehicle says
 
 RESET_TURN_RAD = radians(3.0)
 BLIND_M = 0.1  # of the reported way in a gap of the IMU's samples, per root of a second
@@ -66,10 +75,13 @@ class PlaceEstimator:
     Args:
         camera: of the drone.
         shapes: of the gates of each colour.
+        alone: the vehicle knows its place and its heading from this estimate only, so what it reports of
+            them, beside the height, says nothing; followed points do.
     """
 
-    def __init__(self, camera: CameraModel, shapes: GateShapes) -> None:
+    def __init__(self, camera: CameraModel, shapes: GateShapes, *, alone: bool = False) -> None:
         self._camera, self._shapes = camera, shapes
+        self._points = PointWindow(camera.focal_px) if alone else None
         self._track = InertialTrack()
         self._filter: PlaceFilter | None = None
         self._reports: deque[tuple[int, DroneState, ReportedAccuracy]] = deque()
@@ -80,11 +92,6 @@ class PlaceEstimator:
         self._landmarks = GateLandmarks()
         self._fused_us = 0
         self._misfits = 0  # of known points, in a row
-
-    @property
-    def estimates(self) -> bool:
-        """Whether the filter is used; else the vehicle's reports are."""
-        return self._filter is not None
 
     def add(self, state: DroneState) -> None:
         """Take in a state as the vehicle reports it; call it once a tick, before images are used.
@@ -122,15 +129,21 @@ class PlaceEstimator:
     def _is_sure(self, state: DroneState) -> bool:
         """Whether the vehicle knows its place and its heading, by what it tells."""
         accuracy = state.accuracy
+        if self._points is not None:
+            return False
         return accuracy is None or (self._knows_position(accuracy) and accuracy.heading_std_rad < SURE_RAD)
 
     def _knows_position(self, accuracy: ReportedAccuracy) -> bool:
         if self._first_std_m is None:
             self._first_std_m = accuracy.position_std_m
-        return accuracy.position_std_m < min(SURE_M, max(ALWAYS_SURE_M, SURE_FACTOR * self._first_std_m))
+        return accuracy.position_std_m < min(
+            SURE_OF_POSITION_M, max(ALWAYS_SURE_M, SURE_FACTOR * self._first_std_m)
+        )
 
     def _bridge(self, place: PlaceFilter, last: DroneState, state: DroneState) -> None:
         """Go on while the IMU's samples are missing: by how far the vehicle reports to have moved."""
+        if self._points is not None:
+            self._points.forget(place)
         gap_s = max(0.0, (state.time_us - place.time_us) * 1e-6)
         x, y = turned(state.x - last.x, state.y - last.y, place.turn_rad)
         place.displace(state.time_us, (x, y, state.z - last.z), BLIND_M * sqrt(gap_s), BLIND_M_S)
@@ -160,7 +173,7 @@ class PlaceEstimator:
         motion = self._track.between(place.time_us, time_us)
         if motion is None:
             return False
-        place.predict(motion, settling=self._is_settling(time_us))
+        place.predict(motion, inf if self._points is not None else _heading_std_rad(self._left_us, time_us))
         place.time_us = time_us
         return True
 
@@ -175,7 +188,12 @@ class PlaceEstimator:
             turn_rad = remainder(start.yaw - state.yaw, 2 * pi)
             place.update(stands((start.x, start.y, start.z), turn_rad, *STANDS_STD))
             return
+        height_std_m = max(accuracy.height_std_m, LEAST_HEIGHT_STD_M)
+        if self._points is not None:
+            place.update(height(state.z, height_std_m))
+            return
         slow = sqrt(2.0 * ERROR_S / step_s)
+        height_std_m = slow * max(height_std_m, abs(state.z - float(place.x[2])) / HEIGHT_FACTOR)
         level, climb = (
             slow * max(std, LEAST_VELOCITY_STD_M_S)
             for std in (accuracy.velocity_std_m_s, accuracy.climb_std_m_s)
@@ -187,14 +205,10 @@ class PlaceEstimator:
                 level,
                 climb,
                 position_m=(state.x, state.y, state.z),
-                height_std_m=max(accuracy.height_std_m, LEAST_HEIGHT_STD_M),
+                height_std_m=height_std_m,
                 position_std_m=slow * max(accuracy.position_std_m, LEAST_POSITION_STD_M) if knows else inf,
             )
         )
-
-    def _is_settling(self, time_us: int) -> bool:
-        """Whether the vehicle may correct its heading now."""
-        return self._left_us is None or time_us - self._left_us < SETTLING_US
 
     def _motion_at(self, time_us: int) -> tuple[Vec3, Vec3, float] | None:
         """Position, velocity and turn at a time; None while the vehicle's reports are used."""
@@ -207,7 +221,9 @@ class PlaceEstimator:
             step_s = (time_us - place.time_us) * 1e-6
             px, py, pz = place.x[POSITION].tolist()
             return (px + step_s * x, py + step_s * y, pz + step_s * z), (x, y, z), place.turn_rad
-        return *place.moved(motion), place.turned_rad(motion, settling=self._is_settling(time_us))
+        return *place.moved(motion), place.turned_rad(
+            motion, inf if self._points is not None else _heading_std_rad(self._left_us, time_us)
+        )
 
     def correction(self, time_us: int) -> PoseCorrection | None:
         """Of a pose at a time; None while the vehicle's reports are used."""
@@ -220,19 +236,34 @@ class PlaceEstimator:
         if place is None or motion is None:
             return reported
         (x, y, z), velocity_m_s, turn_rad = motion
-        camera = reported.camera_attitude_arena
+        yaw, camera = remainder(reported.yaw + turn_rad, 2 * pi), reported.camera_attitude_arena
+        covariance = place.covariance(reported.time_us)
+        covariance_m2, yaw_std_rad = covariance[:3, :3].ravel().tolist(), sqrt(covariance[TURN, TURN])
         return replace(
             reported,
             x=x,
             y=y,
             z=z,
-            yaw=remainder(reported.yaw + turn_rad, 2 * pi),
+            yaw=yaw,
             velocity_arena_m_s=velocity_m_s,
             position_age_s=0.0,
             attitude_arena=turned_by(turn_rad, reported.attitude_arena),
             camera_attitude_arena=None if camera is None else turned_by(turn_rad, camera),
-            position_std_m=place.position_std_m(reported.time_us),
+            estimate=PlaceEstimate((x, y, z), yaw, tuple(covariance_m2), yaw_std_rad),
         )
+
+    @property
+    def gates_m(self) -> dict[str, Vec3]:
+        """Where the gates are that the filter has and knows to be gates, by colour."""
+        place = self._filter
+        found: dict[str, Vec3] = {}
+        if place is None:
+            return found
+        for colour, at in place.gates.items():
+            if colour not in self._landmarks.unsized:
+                x, y, z = place.x[at : at + 3].tolist()
+                found[colour] = (x, y, z)
+        return found
 
     @property
     def velocity_error_flu_m_s(self) -> Vec3:
@@ -274,6 +305,18 @@ class PlaceEstimator:
             if view is not None:
                 by_colour.setdefault(sighting.colour, []).append((view, self._eye(pose, at)))
         self._landmarks.see(place, by_colour, gates)
+
+    def see_tracks(self, tracks: PointTracks, rows: Sequence[DronePose], at: PoseCorrection) -> None:
+        """Use followed points in an image, to whose time the filter was brought.
+
+        Args:
+            tracks: in the image.
+            rows: corrected, of the drone when the first, the middle and the last row were read out.
+            at: the correction of these poses.
+        """
+        if self._filter is not None and self._points is not None:
+            eyes = [self._eye(pose, at) for pose in rows]
+            self._points.see(self._filter, tracks, *eyes)
 
     def see_points(
         self, points_m: Floats, sighting: BaseSighting, pose: DronePose, at: PoseCorrection
@@ -334,3 +377,9 @@ class PlaceEstimator:
 
 def _resets(state: DroneState) -> int:
     return 0 if state.accuracy is None else state.accuracy.resets
+
+
+def _heading_std_rad(left_us: int | None, time_us: int) -> float:
+    """Of the reported heading after a second; the vehicle corrects it after it has left the ground."""
+    settling = left_us is None or time_us - left_us < SETTLING_US
+    return TURN_SETTLING_RAD if settling else TURN_RAD

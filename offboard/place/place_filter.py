@@ -1,7 +1,7 @@
 """The filter of the drone's place: an extended Kalman filter over the drone and the gates that it has seen.
 
 The state is the drone's position and velocity in the arena, the angle by which its reported heading is wrong,
-the accelerometer's bias, and for each gate x, y, z and yaw: simultaneous localisation and mapping
+the accelerometer's bias, and for each gate x, y, z, yaw and size: simultaneous localisation and mapping
 (Durrant-Whyte & Bailey, IEEE Robotics & Automation Magazine 13(2), 2006). Roll and pitch are taken as
 reported: the vehicle's own filter knows them by gravity to a fraction of a degree, and what is left acts like
 a bias.
@@ -24,7 +24,8 @@ from offboard.place.inertial_track import InertialMotion
 Floats: TypeAlias = npt.NDArray[np.float64]
 
 POSITION, TURN, VELOCITY, BIAS, OWN = slice(0, 3), 3, slice(4, 7), slice(7, 10), 10
-GATE = 4  # numbers of a gate
+POSE = 4  # numbers of a place: x, y, z and heading; those of the drone come first
+SIZE, GATE = 4, 5  # of a gate: the logarithm of its size over that of its shape; numbers in all
 
 # Noise, as densities and random walks per root of a second: of a small IMU on a vibrating drone, whose
 # reported roll and pitch are wrong by tenths of a degree.
@@ -79,9 +80,12 @@ class PlaceFilter:
 
     Attributes:
         time_us: of the state.
-        x: the state, shape (10 + 4 gates,).
+        x: the state, shape (10 + 5 gates,).
         p: its covariance.
-        gates: the first index of each gate, by colour.
+        gates: the first index of each gate, by colour. Its place is where one of the size of its shape would
+            be, as seen from where it was seen first: that place is known, whatever its size.
+        seen_from_m: that place of the drone, by colour.
+        clones: the first index of where the drone was, by some times.
     """
 
     def __init__(
@@ -98,21 +102,24 @@ class PlaceFilter:
         stds = [position_std_m] * 3 + [START_TURN_RAD] + [velocity_std_m_s] * 3 + [START_BIAS_M_S2] * 3
         self.p = np.diag(np.square(stds))
         self.gates: dict[str, int] = {}
+        self.seen_from_m: dict[str, Floats] = {}
+        self.clones: dict[int, int] = {}
 
     @property
     def turn_rad(self) -> float:
         """What must be added to the reported heading."""
         return float(self.x[TURN])
 
-    def position_std_m(self, time_us: int) -> float:
-        """Standard deviation of the position at a time, of the coordinate known worst."""
-        variances, later_s = self.p.diagonal(), (time_us - self.time_us) * 1e-6
-        return sqrt((variances[POSITION] + later_s**2 * variances[VELOCITY]).max())
+    def covariance(self, time_us: int) -> Floats:
+        """Of x, y, z and the turn at a time soon after the state's, shape (4, 4)."""
+        moved = np.eye(4, OWN)
+        moved[POSITION, VELOCITY] = (time_us - self.time_us) * 1e-6 * np.eye(3)
+        covariance: Floats = moved @ self.p[:OWN, :OWN] @ moved.T
+        return covariance
 
-    def turned_rad(self, motion: InertialMotion, *, settling: bool) -> float:
+    def turned_rad(self, motion: InertialMotion, reported_std_rad: float) -> float:
         """The turn after a motion: that of the reported heading and of the gyroscope, by their noise."""
-        reported, gyro = (TURN_SETTLING_RAD if settling else TURN_RAD) ** 2, GYRO_RAD**2
-        return self.turn_rad + motion.turn_rad * reported / (reported + gyro)
+        return self.turn_rad + motion.turn_rad / (1.0 + (GYRO_RAD / reported_std_rad) ** 2)
 
     def moved(self, motion: InertialMotion) -> tuple[Vec3, Vec3]:
         """Position and velocity after a motion; the state stays."""
@@ -134,7 +141,7 @@ class PlaceFilter:
         )
         return position, velocity
 
-    def predict(self, motion: InertialMotion, *, settling: bool = False) -> None:
+    def predict(self, motion: InertialMotion, reported_std_rad: float = TURN_RAD) -> None:
         """Let the time of a motion pass.
 
         Covariance of a double integrator driven by white noise: Bar-Shalom, Li & Kirubarajan, "Estimation
@@ -142,7 +149,7 @@ class PlaceFilter:
 
         Args:
             motion: since the state.
-            settling: the vehicle may just be correcting its heading.
+            reported_std_rad: of the reported heading, after a second; infinite: it is not used.
         """
         position, velocity = self.moved(motion)
         step_s = motion.duration_s
@@ -161,9 +168,8 @@ class PlaceFilter:
         p[:OWN] = f @ p[:OWN]
         p[:, :OWN] = p[:, :OWN] @ f.T
         p[:OWN, :OWN] += step_s * _BY_TIME + step_s**2 * _BY_TIME_2 + step_s**3 * _BY_TIME_3
-        reported, gyro = (TURN_SETTLING_RAD if settling else TURN_RAD) ** 2, GYRO_RAD**2
-        p[TURN, TURN] += step_s * reported * gyro / (reported + gyro)
-        self.x[TURN] = self.turned_rad(motion, settling=settling)
+        p[TURN, TURN] += step_s * GYRO_RAD**2 / (1.0 + (GYRO_RAD / reported_std_rad) ** 2)
+        self.x[TURN] = self.turned_rad(motion, reported_std_rad)
         self.time_us += round(step_s * 1e6)
 
     def displace(self, time_us: int, by_m: Vec3, std_m: float, velocity_std_m_s: float) -> None:
@@ -190,9 +196,9 @@ class PlaceFilter:
         """
         common = np.zeros((len(self.x), 4))
         common[:4] = np.eye(4)
-        for at in self.gates.values():
+        for at in (*self.gates.values(), *self.clones.values()):
             x, y, _ = self.x[at : at + 3] - self.x[POSITION]
-            common[at : at + GATE] = np.eye(GATE)
+            common[at : at + POSE] = np.eye(POSE)
             common[at : at + 2, TURN] = (-y, x)
         self.p += common * np.square((*std_m, heading_std_rad)) @ common.T
 
@@ -243,45 +249,91 @@ class PlaceFilter:
         self.x, self.p = at, kept @ self.p @ kept.T + gain @ noise @ gain.T
         return True
 
-    def add_gate(self, colour: str, state: Floats, covariance: Floats) -> None:
+    def add_gate(self, colour: str, state: Floats, covariance: Floats, size_std: float) -> None:
         """Begin to estimate a gate: x, y, z and yaw as seen from the drone where it is estimated to be.
 
         Args:
             colour: of the gate, which is not in the state yet.
-            state: in the arena.
+            state: in the arena, if it has the size of its shape.
             covariance: of the errors of seeing it, those of the drone's place not included, shape (4, 4).
+            size_std: standard deviation of the logarithm of its size.
         """
         n = len(self.x)
+        noise = np.diag((0.0, 0.0, 0.0, 0.0, size_std**2))
+        noise[:POSE, :POSE] = covariance
+        self.seen_from_m[colour] = self.x[POSITION].copy()
+        x, y, _ = state[:3] - self.x[POSITION]
         j = np.zeros((GATE, n))
         j[:3, POSITION] = np.eye(3)
-        x, y, _ = state[:3] - self.x[POSITION]
-        j[:, TURN] = (-y, x, 0.0, 1.0)
+        j[:POSE, TURN] = (-y, x, 0.0, 1.0)
         across = j @ self.p
-        self.p = np.block([[self.p, across.T], [across, across @ j.T + covariance]])
-        self.x = np.concatenate((self.x, state))
+        self.p = np.block([[self.p, across.T], [across, across @ j.T + noise]])
+        self.x = np.concatenate((self.x, state, (0.0,)))
         self.gates[colour] = n
 
     def drop_gate(self, colour: str) -> None:
         """Forget a gate."""
-        at = self.gates.pop(colour)
-        kept = np.r_[0:at, at + GATE : len(self.x)]
+        self._cut(self.gates.pop(colour), GATE)
+
+    def add_clone(self, time_us: int) -> None:
+        """Keep where the drone is now, as it is at a time."""
+        now = np.r_[0:POSE]
+        self.clones[time_us] = len(self.x)
+        self.x = np.concatenate((self.x, self.x[now]))
+        self.p = np.block([[self.p, self.p[:, now]], [self.p[now], self.p[np.ix_(now, now)]]])
+
+    def drop_clone(self, time_us: int) -> None:
+        """Forget where the drone was at a time."""
+        self._cut(self.clones.pop(time_us), POSE)
+
+    def _cut(self, at: int, count: int) -> None:
+        kept = np.r_[0:at, at + count : len(self.x)]
         self.x, self.p = self.x[kept], self.p[np.ix_(kept, kept)]
-        self.gates = {other: n if n < at else n - GATE for other, n in self.gates.items()}
+        self.gates = {other: n if n < at else n - count for other, n in self.gates.items()}
+        self.clones = {other: n if n < at else n - count for other, n in self.clones.items()}
+
+    def inform(self, index: npt.NDArray[np.intp], information: Floats, vector: Floats) -> None:
+        """Use measurements by what they say of a part of the state (information filter).
+
+        Args:
+            index: of that part, shape (k,).
+            information: Jacobian's transpose times inverse noise times Jacobian, shape (k, k).
+            vector: likewise times the residual, shape (k,).
+        """
+        across = self.p[:, index]
+        inner = np.eye(len(index)) + information @ across[index]
+        gain = np.linalg.solve(inner.T, across.T).T  # covariance of all with that part, afterwards
+        self.x = self.x + gain @ vector
+        p = self.p - gain @ information @ across.T
+        self.p = 0.5 * (p + p.T)
 
     def gate(self, colour: str) -> Floats | None:
         """x, y, z and yaw of a gate; None if it is not estimated."""
         at = self.gates.get(colour)
-        return None if at is None else self.x[at : at + GATE]
+        return None if at is None else self.x[at : at + POSE]
+
+    def size(self, colour: str) -> tuple[float, float]:
+        """The logarithm of a gate's size, and its standard deviation."""
+        at = self.gates[colour] + SIZE
+        return float(self.x[at]), sqrt(self.p[at, at])
+
+    def if_sized(self, colour: str) -> Floats:
+        """x, y, z and yaw of a gate if it has the size of its shape."""
+        first = self.gates[colour]
+        at = first + SIZE
+        by_size: Floats = self.p[first : first + POSE, at] / self.p[at, at]
+        sized: Floats = self.x[first : first + POSE] - self.x[at] * by_size
+        return sized
 
     def gate_from_drone(self, colour: str) -> Floats:
         """Covariance of a gate's place and yaw relative to the drone, in the arena's axes, shape (4, 4)."""
         first = self.gates[colour]
-        gate = slice(first, first + GATE)
+        gate = slice(first, first + POSE)
         px, py = self.x[:2].tolist()
         x, y = self.x[first : first + 2].tolist()
         by_drone = np.array(
             ((1.0, 0.0, 0.0, py - y), (0.0, 1.0, 0.0, x - px), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
         )
-        relative = self.p[gate] - by_drone @ self.p[:GATE]  # its position and turn come first
-        covariance: Floats = relative[:, gate] - relative[:, :GATE] @ by_drone.T
+        relative = self.p[gate] - by_drone @ self.p[:POSE]
+        covariance: Floats = relative[:, gate] - relative[:, :POSE] @ by_drone.T
         return covariance

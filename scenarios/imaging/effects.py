@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from math import hypot
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
+from scenarios.imaging.furnishings import PatchColour, Person, Picture, Surface, Window
+from scenarios.imaging.textures import Texture
 from scenarios.part import Part
 
 MAX_K, MAX_P = 1.0, 0.1
@@ -99,23 +101,6 @@ class CameraEffects(Part):
     auto_balance: float = Field(0.5, ge=0, le=1, description="how far they are drawn together if it is auto")
 
 
-Surface = Literal["floor", "front", "back", "left", "right"]
-"""The arena's floor, and the walls of the hall at +x, -x, +y and -y."""
-PatchColour = Literal["red", "green", "blue", "cyan", "magenta", "yellow", "orange", "white", "black"]
-SURFACES: tuple[Surface, ...] = ("floor", "front", "back", "left", "right")
-PATCH_COLOURS: tuple[PatchColour, ...] = (
-    "red",
-    "green",
-    "blue",
-    "cyan",
-    "magenta",
-    "yellow",
-    "orange",
-    "white",
-    "black",
-)
-
-
 class Patch(Part):
     """A flat rectangle on a surface: a poster, a stripe, a sheet; or only its border."""
 
@@ -139,5 +124,11 @@ class Patch(Part):
 class Hall(Part):
     """A room around the arena. It is only seen: nothing collides with its walls."""
 
+    often_unused: ClassVar = ("wall_texture", "windows", "pictures", "people")
+
     beyond_m: float = Field(1.5, ge=0.01, le=100, description="from the arena's border to the walls")
     height_m: float = Field(5.0, ge=0.1, le=100, description="of the ceiling")
+    wall_texture: Texture | None = Field(None, description="of the walls; by default they are plain")
+    windows: tuple[Window, ...] = Field((), max_length=100, description="in the walls")
+    pictures: tuple[Picture, ...] = Field((), max_length=100, description="on the walls")
+    people: tuple[Person, ...] = Field((), max_length=50, description="who stand outside the arena")

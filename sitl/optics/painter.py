@@ -37,9 +37,18 @@ from sitl.camera_projection import (
     clip_half_plane,
     drone_outlines,
 )
-from sitl.camera_scene import DRONE_BGR, GROUND_BGR, SKY_BGR, UNDERGROUND_BGR, PaintTree, build_scene
+from sitl.camera_scene import (
+    DRONE_BGR,
+    GROUND_BGR,
+    SHADOW,
+    SKY_BGR,
+    UNDERGROUND_BGR,
+    PaintTree,
+    build_scene,
+)
 from sitl.optics.backdrop import Backdrop
-from sitl.optics.hall import hall_faces
+from sitl.optics.hall import HallFaces
+from sitl.optics.textured import TexturePainter
 
 Image = npt.NDArray[np.uint8]
 
@@ -61,6 +70,7 @@ class _Lit:
     tree: PaintTree
     mesh: Mesh
     floor: tuple[MeshFace, ...]  # and the hall's walls: in the order of painting, before all else
+    shadows: range  # of the floor's faces those that darken what is below them, if that is a picture
     solid: tuple[MeshFace, ...]  # in the order of the tree's faces
     part: list[int]  # of each of these, its number among the mesh's parts
 
@@ -77,6 +87,8 @@ class Painter:
         turn_rad_s = abs(scenario.light.turn_rad_s)
         self._step_us = round(1e6 * _LIGHT_STEP_RAD / turn_rad_s) if turn_rad_s > 0.0 else None
         self._step = 0
+        self._surroundings = HallFaces(scenario)
+        self._textured = TexturePainter(pinhole)
         self._lit = self._light(0)
 
     def paint(
@@ -118,9 +130,8 @@ class Painter:
             self._lit = self._light(self._step * self._step_us)
         lit = self._lit
         projection = lit.mesh.project(eye_arena_m, rotation, drift)
-        seen = projection.seen
         if backdrop is None:
-            _paint(canvas, projection, [face for face in lit.floor if seen[face.index]])
+            self._paint_floor(canvas, projection, lit)
         order = lit.tree.back_to_front(eye_arena_m)
         painted = 0
         for behind, outline in self._place_drones(drones, eye_arena_m, rotation) if drones else ():
@@ -134,13 +145,16 @@ class Painter:
         """The scene in the light of a time."""
         light = self._scenario.light.after(time_us / 1e6)
         scene = build_scene(self._scenario, light)
-        tree = PaintTree(scene.bodies)
-        walls, on_floor = hall_faces(self._scenario, light)
-        floor = (*walls, scene.tatami, *scene.mats, *scene.shadows, *on_floor)
+        surroundings = self._surroundings
+        tree = PaintTree((*scene.bodies, *surroundings.people(light)))
+        below = surroundings.before_shadows(scene, light)
+        floor = (*below, *scene.shadows, *surroundings.after_shadows(light))
         mesh = Mesh([*floor, *tree.faces], [len(floor) + first for first in tree.parts], self._pinhole)
         sizes = np.diff(tree.parts, append=len(tree.faces))
         part = np.repeat(np.arange(1, len(sizes) + 1), sizes).tolist()
-        return _Lit(tree, mesh, mesh.faces[: len(floor)], mesh.faces[len(floor) :], part)
+        first, stop = len(below), len(below) + len(scene.shadows)
+        shadows = range(first, stop) if surroundings.is_floor_textured else range(0)
+        return _Lit(tree, mesh, mesh.faces[: len(floor)], shadows, mesh.faces[len(floor) :], part)
 
     def _place_drones(
         self, drones: Sequence[Solid], eye: Vec3, rotation: RotationRows
@@ -152,6 +166,23 @@ class Painter:
         )
         outlines = [outline for _, outline in found]
         return sorted(zip(places.tolist(), outlines, strict=True), key=lambda each: each[0])
+
+    def _paint_floor(self, canvas: Image, projection: Projection, lit: _Lit) -> None:
+        """Floor, walls, and what is on them."""
+        seen, shadows = projection.seen, lit.shadows
+        if not shadows and all(face.texture is None for face in lit.floor):
+            _paint(canvas, projection, [face for face in lit.floor if seen[face.index]])
+            return
+        for face in lit.floor:
+            if face.index == shadows.start and shadows:
+                outlines = [projection.outline(lit.floor[index]) for index in shadows if seen[index]]
+                self._textured.darken(canvas, [each for each in outlines if each is not None], SHADOW)
+            if not seen[face.index] or face.index in shadows:
+                continue
+            if face.texture is None:
+                _paint(canvas, projection, (face,))
+            else:
+                self._textured.paint(canvas, projection, face, face.texture)
 
     def _paint_background(self, canvas: Image, rotation: RotationRows) -> None:
         """Paint the haze and the ground: bands between lines parallel to the horizon."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from math import sqrt
 
+from framerunner.errors import SettingError
 from framerunner.vehicle.airframe import Airframe
 from sitl.autopilots.parameters import Value
 from sitl.px4.transmitter import CHANNELS
@@ -54,6 +55,49 @@ _MAX_PX4_MIN_THRUST = 0.12  # PX4's default
 _HORIZON_RESERVE_MS = 24  # with less, poses come too late for their time and the estimate lags by 20 ms
 _MAX_GPS_DRIFT_M_S = 0.3  # on the ground
 _ARRIVAL_EARLY_MS = 4  # a pose or fix is stamped with the clock of the tick before that of its arrival
+
+
+_FLOW_ESTIMATOR: dict[str, Value] = {
+    "EKF2_OF_CTRL": 1,
+    "EKF2_RNG_CTRL": 1,  # flow is a velocity only with a distance to the ground
+    "EKF2_HGT_REF": 0,  # over gates and a base a range is not the height
+}
+_NO_GPS: dict[str, Value] = {"SYS_HAS_GPS": 0, "EKF2_GPS_CTRL": 0}
+_DRONES_WITH_POSES: dict[str, Value] = {
+    **_NO_GPS,
+    "EKF2_EV_CTRL": 15,  # position, height, velocity and yaw
+    "EKF2_HGT_REF": 3,
+    "EKF2_RNG_CTRL": 0,
+    "SYS_HAS_MAG": 0,
+    "EKF2_MAG_TYPE": 5,
+    "EKF2_EV_DELAY": 0.0,
+    "EKF2_EVP_NOISE": 0.01,
+    "EKF2_EVV_NOISE": 0.02,
+    "EKF2_EVA_NOISE": 0.02,
+    "EKF2_DELAY_MAX": 20.0,
+    "EKF2_ASP_DELAY": 20.0,
+    "EKF2_GPS_DELAY": 20.0,
+    "EKF2_OF_DELAY": 20.0,
+    "EKF2_TAU_POS": 0.1,
+    "EKF2_TAU_VEL": 0.1,
+}
+"""Of docs/real-drone.md: an estimate that follows motion capture closely."""
+
+
+def drone_parameters(suite: SuiteSpec) -> dict[str, Value]:
+    """What the estimator of a real drone with PX4 needs for the sensors that say where it is.
+
+    Args:
+        suite: with such sensors.
+
+    Raises:
+        SettingError: it has neither motion capture nor optical flow.
+    """
+    if suite.external_pose is not None:
+        return dict(_DRONES_WITH_POSES)
+    if suite.optical_flow is not None and suite.gps is None:
+        return {**_NO_GPS, "EKF2_EV_CTRL": 0, **_FLOW_ESTIMATOR}
+    raise SettingError(f"--sensors {suite.name}: a real drone indoors has mocap or flow")
 
 
 def all_parameters(
@@ -157,9 +201,8 @@ def suite_parameters(suite: SuiteSpec) -> dict[str, Value]:
     flow = suite.optical_flow
     if flow is not None and pose is None and suite.gps is None:
         values |= {
-            "EKF2_RNG_CTRL": 1,  # flow is a velocity only with a distance to the ground
-            "EKF2_HGT_REF": 0,
             "EKF2_OF_DELAY": 0,
+            **_FLOW_ESTIMATOR,
             "SENS_FLOW_MINHGT": flow.min_distance_m,
             "SENS_FLOW_MAXHGT": flow.max_distance_m,
             "SENS_FLOW_MAXR": flow.max_flow_rad_s,

@@ -64,9 +64,10 @@ def estimator_settings(spec: SuiteSpec) -> EstimatorSettings:
 
 def parameter_defaults(spec: SuiteSpec) -> dict[str, float]:
     """The parameters that a vehicle with this suite has by default, as those of an airframe's file."""
-    if spec.external_pose is None or spec.external_pose.source != "mavlink":
+    if spec.external_pose is None or spec.external_pose.source == "simulated":
         return {}
-    return {"EKF2_EV_CTRL": 15, "EKF2_EVP_NOISE": 0.01, "EKF2_EVA_NOISE": 0.02}
+    noise = {"EKF2_EVP_NOISE": 0.01, "EKF2_EVA_NOISE": 0.02}
+    return {"EKF2_EV_CTRL": 15, **noise}
 
 
 def _walk(sigma: float, time_constant_s: float) -> float:

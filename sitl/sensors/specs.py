@@ -140,12 +140,13 @@ class OpticalFlowSpec(Part):
 
 
 class ExternalPoseSpec(Part):
-    """A motion capture system: position and attitude, no velocity.
+    """Position and attitude by cameras, no velocity: motion capture, or visual odometry.
 
-    With the source `mavlink` the figures are what the estimator assumes of the poses that it receives.
+    With the sources `mavlink` and `app` the figures are what the estimator assumes of the poses that it
+    receives as ODOMETRY: of another program, or of the app that flies, by the drone's own camera.
     """
 
-    source: Literal["simulated", "mavlink"] = Field(
+    source: Literal["simulated", "mavlink", "app"] = Field(
         "simulated", description="whether poses are simulated here, or received as MAVLink ODOMETRY"
     )
     rate_hz: Rate = Field(description="poses a second that are sent to the drone")

@@ -100,6 +100,9 @@ class KinematicDrone:
         self.armed = False
         self.z = self.base_m
 
+    def report_place(self, state):
+        """This one knows its place."""
+
     async def refuse(self) -> None:
         self.calls.append("refuse")
         self.pilot_mode = "HOLD"

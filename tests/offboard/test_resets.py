@@ -59,7 +59,7 @@ def test_a_turned_frame_is_followed_and_the_drone_stays_where_it_is(turned_deg, 
     vehicle.report().fly(STEP_S)
     true = alignment.pose(Pose((vehicle.x, vehicle.y, -1.5), vehicle.yaw))
     (jump,) = vehicle.reset(radians(turned_deg)).report().feed.take()
-    after = followed(alignment, jump)
+    after = followed(alignment, jump, drifts=False)
     now = after.pose(Pose((vehicle.x, vehicle.y, -1.5), vehicle.yaw))
     assert now.position_m == pytest.approx(true.position_m, abs=1e-3)
     assert now.yaw_rad == pytest.approx(true.yaw_rad, abs=1e-3)
@@ -75,7 +75,7 @@ def test_a_turned_frame_is_followed_and_the_drone_stays_where_it_is(turned_deg, 
 def test_a_small_change_of_the_position_is_a_correction():
     alignment, vehicle = ArenaAlignment(START_ARENA, START_NED), Vehicle()
     (jump,) = vehicle.report().fly(STEP_S).reset(moved_m=0.1).report().feed.take()
-    assert followed(alignment, jump) is alignment
+    assert followed(alignment, jump, drifts=False) is alignment
 
 
 @pytest.mark.parametrize(
@@ -90,7 +90,18 @@ def test_a_place_that_is_not_known_ends_the_flight_in_words(gap_s, moved_m, chan
     vehicle = Vehicle().report().fly(gap_s).reset(radians(10), moved_m).report(**changed)
     (jump,) = vehicle.feed.take()
     with pytest.raises(DroneError, match=told):
-        followed(ArenaAlignment(START_ARENA, START_NED), jump)
+        followed(ArenaAlignment(START_ARENA, START_NED), jump, drifts=False)
+
+
+@pytest.mark.parametrize("turned_deg", [0.0, 30.0])
+def test_a_drifting_vehicle_is_followed_wherever_its_estimator_moves(turned_deg):
+    alignment, vehicle = ArenaAlignment(START_ARENA, START_NED), Vehicle().report().fly(STEP_S)
+    true = alignment.pose(Pose((vehicle.x, vehicle.y, -1.5), vehicle.yaw))
+    (jump,) = vehicle.reset(radians(turned_deg), moved_m=2.0).report().feed.take()
+    after = followed(alignment, jump, drifts=True)
+    now = after.pose(Pose((vehicle.x, vehicle.y, -1.5), vehicle.yaw))
+    assert now.position_m == pytest.approx(true.position_m, abs=1e-3)
+    assert now.yaw_rad == pytest.approx(true.yaw_rad, abs=1e-3)
 
 
 def test_packets_that_are_late_and_those_of_others_are_no_resets():

@@ -97,7 +97,7 @@ def lockstep_flight(tmp_path_factory):
     plan = FlightPlan(load_scenario("test-case-1"), load_mission("explorer"))
     with FlightRecording(path, plan.scenario, plan.chart, None) as recording:
         flown = fly_lockstep(plan, observers=(recording.see,), on_image=recording.see_image)
-        recording.finish(flown.result, flown.track.time_s)
+        recording.finish(flown.result, flown.track)
     return flown.result, path
 
 
@@ -139,7 +139,7 @@ def test_a_drone_that_estimates_its_place_flies_as_in_lockstep_too(tmp_path):
     path = tmp_path / "lockstep.mcap"
     with FlightRecording(path, plan.scenario, plan.chart, None) as recording:
         flown = fly_lockstep(plan, observers=(recording.see,))
-        recording.finish(flown.result, flown.track.time_s)
+        recording.finish(flown.result, flown.track)
     ticks, wanted_ticks = (events(each)[0] for each in (run, path))
     assert len(ticks) == len(wanted_ticks) > 400
     for tick, wanted in zip(ticks, wanted_ticks, strict=True):

@@ -73,3 +73,29 @@ layout:
 """
     with pytest.raises(LevelError, match=message):
         LEVEL_FILES.parse(layout + section, "bad.yaml")
+
+
+def test_textures_are_drawn_from_streams_of_their_own():
+    fields = INDOOR.model_dump(exclude_none=True)
+    textured = Level.model_validate({**fields, "textures": {"floor": ["wood", "carpet"], "walls": ["brick"]}})
+    drawn = [random_scenario(textured, seed) for seed in range(20)]
+    assert {scenario.floor_texture.pattern for scenario in drawn} == {"wood", "carpet"}
+    assert len({scenario.floor_texture.seed for scenario in drawn}) == len(drawn)
+    assert {scenario.hall.wall_texture.pattern for scenario in drawn} == {"brick"}
+    plain = random_scenario(INDOOR, 5)
+    hall = drawn[5].hall.model_copy(update={"wall_texture": None})
+    assert drawn[5].model_copy(update={"floor_texture": None, "hall": hall}) == plain
+
+
+def test_hall_has_the_layouts_of_calm_and_is_full_of_things():
+    calm, scenario = (random_scenario(load_level(name), 17) for name in ("calm", "hall"))
+    clutter = load_level("hall").clutter
+    assert scenario.frames == calm.frames
+    assert scenario.sensors == "ideal"
+    hall = scenario.hall
+    counts = (len(hall.windows), len(hall.pictures), len(hall.people))
+    assert counts == (clutter.windows, clutter.pictures, clutter.people)
+    for person in hall.people:
+        beyond_m = max(abs(person.x_m), abs(person.y_m)) - 5.0
+        assert scenario.arena.margin_m < beyond_m < clutter.beyond_m
+    assert random_scenario(load_level("hall"), 18).hall.people != hall.people

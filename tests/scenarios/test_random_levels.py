@@ -49,7 +49,8 @@ def test_a_level_loads_by_path(tmp_path):
         (
             CALM + "fog: 1\n",
             "f.yaml:20: fog is not a known field; known here: name, description, layout, closeness, "
-            "shapes, obstacles, wind, faults, camera, view, light, clutter, airframe, sensors",
+            "shapes, obstacles, wind, faults, camera, view, light, clutter, textures, base_marker, airframe, "
+            "sensors",
         ),
         (CALM + "  apart: 1\n", "f.yaml:20: layout.apart is not a known field; did you mean apart_m?"),
         (

@@ -1,4 +1,5 @@
 import json
+from itertools import pairwise
 from math import nan
 
 import pytest
@@ -88,6 +89,16 @@ def test_a_clean_try():
     assert report.landing_error_m == 0.0
     assert flight.referee.settled
     assert flight.referee.over
+
+
+def test_the_flown_path_has_ten_positions_a_second_and_is_that_of_the_last_try():
+    flight = Flight().motors(True).fly((-3.0, -3.0, 1.0)).motors(False)
+    referee = flight.wait(1.0).referee
+    times_s = [time_s for time_s, *_ in referee.flown_path]
+    steps_s = [after - before for before, after in pairwise(times_s)]
+    assert times_s[0] == 0.0
+    assert steps_s == pytest.approx([0.1] * len(steps_s), abs=0.02)
+    assert max(z for *_, z in referee.flown_path) == pytest.approx(1.0, abs=0.1)
 
 
 def test_a_report_is_plain_json():

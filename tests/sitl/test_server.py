@@ -115,7 +115,9 @@ async def test_who_looks_on_learns_the_task_and_where_the_local_frame_is():
 async def test_who_looks_on_learns_where_the_drone_stands_while_it_stands_upright():
     simulation = Simulation(load_scenario("test-case-1"))
     async with serving(simulation) as (_, settings):
-        place, true = (await referee(settings))["stands_at"], simulation.truth
+        answer = await referee(settings)
+        place, true = answer["stands_at"], simulation.truth
+        assert answer["position_arena_m"] == pytest.approx(true.position_arena_m, abs=0.01)
         assert place["position_arena_m"] == pytest.approx(true.position_arena_m, abs=0.01)
         assert place["yaw_rad"] == pytest.approx(simulation.scenario.start.yaw_rad, abs=0.01)
     upside_down = replace(true, attitude_arena=(0.0, 1.0, 0.0, 0.0))

@@ -4,13 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Protocol
 
-from vision.base.finder import BaseFinder
 from vision.detectors import Detector
-from vision.types import BaseExpectation, Detections, Image
+from vision.types import BaseExpectation, BaseSighting, Detections, Image
 
 BaseExpectations = Callable[[int], BaseExpectation | None]
 """From the vehicle time of an image (microseconds) to what is expected in it; None: nothing is."""
+
+
+class FindsBase(Protocol):
+    """What looks for the base: by its edges (`BaseFinder`), or by markers on it (`MarkerReader`)."""
+
+    def find(self, image: Image, expected: BaseExpectation) -> BaseSighting | None:
+        """The base in an image, BGR; None if it is not seen, or not surely the base."""
 
 
 class DetectorWithBase:
@@ -24,7 +31,7 @@ class DetectorWithBase:
         expected: what is expected in an image; at first nothing.
     """
 
-    def __init__(self, detect: Detector, finder: BaseFinder) -> None:
+    def __init__(self, detect: Detector, finder: FindsBase) -> None:
         self.expected: BaseExpectations = lambda _time_us: None
         self._detect, self._finder = detect, finder
 

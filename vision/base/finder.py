@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import hypot
 from typing import Final
 
 import numpy as np
 
+from framerunner.geometry.rotations import rotation
 from vision.base.edges import EdgeMeasurements, EdgePlaces, Pixels, measured, noise_of, places_on, steepest
 from vision.base.model import (
     BACKGROUND,
@@ -29,6 +31,8 @@ from vision.types import BaseExpectation, BaseSighting, Image
 LEAST_SCORE: Final = 0.7
 """A lower share of the outline is no sighting."""
 _SURE_SCORE: Final = 0.9  # nothing better is looked for
+_AT_ONCE_SCORE: Final = 0.75  # likewise of one that is where a precise expectation has it
+_AT_ONCE_PX: Final = 12.0  # standard deviation of a precise expectation
 _OTHER_TURNS_RAD: Final = (0.1, -0.1)
 _BORDER_PX: Final = 2.0  # of the image, where no edge is measured
 _SHORTEST_PX: Final = 4.0
@@ -100,6 +104,14 @@ class BaseFinder:
         std = np.array([*expected.eye_std_m, _TILT_STD_RAD, _TILT_STD_RAD, expected.heading_std_rad])
         half_px = (width / 2 - _BORDER_PX, height / 2 - _BORDER_PX)
         attempt = _Attempt(Pixels(image, lens), self._camera, half_px, std=std, noise=noise, least=least)
+        away_m = max(hypot(*expected.eye_m), NEAREST_M)
+        std_px = self._camera.focal_px * hypot(max(expected.eye_std_m) / away_m, expected.heading_std_rad)
+        if std_px < _AT_ONCE_PX:
+            turn = np.array(rotation(expected.attitude)).reshape(3, 3)
+            fit = attempt.fit(CameraView(np.array(expected.eye_m), turn), np.zeros(6))
+            score = 0.0 if fit is None else attempt.score(fit)
+            if fit is not None and score >= _AT_ONCE_SCORE:
+                return attempt.sighting(fit, score)
         best, best_score = None, LEAST_SCORE
         starts = search(image, self._camera, expected, least)
         while starts and best_score < _SURE_SCORE:

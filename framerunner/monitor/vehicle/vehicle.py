@@ -10,6 +10,7 @@ from functools import partial
 from math import cos, sin
 from typing import Any
 
+from framerunner.geometry.vectors import Vec3
 from framerunner.monitor.ports import Equipment
 from framerunner.monitor.vehicle.camera import CAMERAS, CameraWatch
 from framerunner.monitor.vehicle.commands import OWN_SYSTEM, Answer, StickStream, carry_out
@@ -102,6 +103,7 @@ class MonitoredVehicle:
         self._rates = pose_rates(_WANTED_HZ, _ENOUGH, _RATE_SPAN_S, now_s, _MAX_RATE_REQUESTS)
         self._restarts = self._telemetry.restarts
         self._has_flown = False
+        self._truth_m: Vec3 | None = None
         self._result_crc: int | None = None
 
     def take(self, message: Message, now_s: float, host: str = "") -> None:
@@ -159,6 +161,7 @@ class MonitoredVehicle:
             "id": self.id,
             "t": position.time_us * 1e-6,
             "p": [round(x, 4), round(y, 4), round(z, 4)],
+            "truth": None if self._truth_m is None else [round(value, 4) for value in self._truth_m],
             "q": [round(qw, 5), round(qx, 5), round(qy, 5), round(qz, 5)],
             "v": [round(c * north + s * east, 3), round(s * north - c * east, 3), round(-down, 3)],
             "r": round(-attitude.turn_rate_ned_rad_s, 3),
@@ -308,6 +311,7 @@ class MonitoredVehicle:
             frame = answer.local_frame
             if frame is not None:
                 self._placement.lay_by_frame(frame.origin_arena_m, frame.yaw_rad)
+            self._truth_m = answer.position_arena_m
             self._judging.take_standing(answer, asyncio.get_running_loop().time())
 
         def say(level: str, text: str) -> None:

@@ -6,12 +6,14 @@ A hypothesis of where the gate is is an extended Kalman filter that measures the
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, exp, hypot, log, log1p, pi, sin, sqrt, tau
+from math import cos, dist, exp, hypot, log, log1p, pi, sin, sqrt, tau
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from framerunner.geometry.gate_shape import GateShape
+from framerunner.geometry.vectors import Vec3
+from offboard.navigation.camera_model import NEAREST_M
 from offboard.navigation.gates.gate_measurement import (
     Floats,
     GateView,
@@ -172,10 +174,20 @@ DOUBTED_MISSES = 3  # in a row; then another gate of the colour is preferred
 
 PREDICTED_S = 0.3  # a gate does not move, and drifts slowly
 
-# Hypotheses are made anew after so many views that contradict them all, and one more for so much belief.
+# After so many views in a row that contradict all hypotheses none is certain; after so many, and one more for
+# so much belief, they are made anew.
 MISFITS = 3
 MISFITS_PER_BELIEF = 6
 MISFITS_USED = 4
+
+# Views that fit, but worse than those of a gate do (99 % of the means of three: 0.36 at most), are of a thing
+# that is larger or smaller and elsewhere.
+STRAINED = 0.5  # mean square of the last views' deviations, as a share of the largest that fits
+STRAIN_WEIGHT = 1.0 / 3.0  # of the last view in that mean
+
+# A larger or smaller thing elsewhere looks like a gate from one place: it takes a way of so large a share of
+# the distance to see that it is none.
+LEAST_PARALLAX = 0.15
 
 PRUNED = 9.0  # natural logarithm of a ratio of likelihoods at which a hypothesis is dropped
 AMBIGUOUS = 4.6  # at which it no longer counts
@@ -229,6 +241,8 @@ class GateTrack:
         self._hypotheses = [GateFilter(solution) for solution in found]
         self._used = view
         self._misfits: list[GateView] = []
+        self._strain = found[0].cost / CHI_SQUARED[sum(view.seen)]
+        self._first_eye_m, self._parallax = view.camera.position_m, 0.0
         self._prune()
 
     @property
@@ -271,6 +285,8 @@ class GateTrack:
         """Use a view that fits; one from nearly the same place as the last adds nothing but belief."""
         self._saw(view)
         self._misfits.clear()
+        self._strain += STRAIN_WEIGHT * (fit.distance2 / fit.gate - self._strain)
+        self._move_eye(view.camera.position_m)
         if not is_moved(view, self._used) and view.time_us - self._used.time_us < NOVEL_US:
             return
         self._used = view
@@ -296,11 +312,15 @@ class GateTrack:
             return
         some = misfits[:: -(-len(misfits) // MISFITS_USED)]
         found = solutions(some, prior)
-        if not found or found[0].cost > sum(CHI_SQUARED[sum(view.seen)] for view in some):
+        largest = sum(CHI_SQUARED[sum(view.seen)] for view in some)
+        if not found or found[0].cost > largest:
             del misfits[: len(misfits) // 2]
             return
         self._hypotheses = [GateFilter(solution) for solution in found]
+        self._strain = found[0].cost / largest
         self._prune()
+        self._first_eye_m, self._parallax = some[0].camera.position_m, 0.0
+        self._move_eye(view.camera.position_m)
         self.belief, self.missed, self.views = SEEN_BELIEF * len(misfits), 0, len(some)
         self.seen_us, self._used = view.time_us, view
         misfits.clear()
@@ -350,11 +370,23 @@ class GateTrack:
             position_std_m=(sqrt(vx), sqrt(vy), sqrt(vz)),
             yaw_std_rad=sqrt(v_yaw),
             ambiguous=ambiguous,
-            certain=not ambiguous and is_certain(yaw, self.covariance, self.shape, self.views),
+            certain=not ambiguous
+            and self._is_consistent
+            and is_certain(yaw, self.covariance, self.shape, self.views),
             views=self.views,
             seen_us=self.seen_us,
             shape=self.shape,
         )
+
+    @property
+    def _is_consistent(self) -> bool:
+        """Views from several places are of one thing, of the size of a gate."""
+        return self._parallax >= LEAST_PARALLAX and self._strain <= STRAINED and len(self._misfits) < MISFITS
+
+    def _move_eye(self, eye_m: Vec3) -> None:
+        x, y, z, _ = self.state.tolist()
+        away_m = max(dist(eye_m, (x, y, z)), NEAREST_M)
+        self._parallax = max(self._parallax, dist(eye_m, self._first_eye_m) / away_m)
 
     def _saw(self, view: GateView) -> None:
         self.seen_us = view.time_us

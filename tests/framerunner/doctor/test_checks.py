@@ -342,3 +342,19 @@ def test_an_estimator_that_is_not_aligned_is_named():
     record = healthy()
     put(record, estimator_status(flags=128))
     assert "estimator" in missing(record)
+
+
+def test_a_position_by_optical_flow_is_no_reason_not_to_fly():
+    """Flags: a relative position predicted and no absolute one; a range finder is heard."""
+    record = healthy(EKF2_HGT_REF=0.0, EKF2_EV_CTRL=0.0)
+    flags = 431 & ~(mavlink.ESTIMATOR_PRED_POS_HORIZ_ABS | mavlink.ESTIMATOR_POS_HORIZ_ABS)
+    put(
+        record,
+        estimator_status(flags | mavlink.ESTIMATOR_PRED_POS_HORIZ_REL, horizontal_m=1.2, vertical_m=0.3),
+    )
+    assert "height" in missing(record)
+    record.counts["DISTANCE_SENSOR"] = 60
+    assert {"position", "height"} <= notes(record)
+    assert not {"position", "height"} & missing(record)
+    (advice,) = (check.advice for check in examine(record) if check.name == "position")
+    assert "doctor --walk" in advice

@@ -282,9 +282,20 @@ def test_the_page_names_what_is_missing_and_the_exit_code_is_one(monkeypatch, ca
     assert "cannot fly the challenge yet" in page
 
 
+def test_after_a_walk_it_is_said_what_the_walk_has_shown(monkeypatch, capsys):
+    monkeypatch.setattr("framerunner.commands.doctor.time.monotonic", next(Open.clocks))
+    monkeypatch.setattr("framerunner.wire.transports.vehicle_link.VehicleLink", Open)
+    monkeypatch.setenv("COLUMNS", "200")
+    assert run(["doctor", "--drone", "udpin://0.0.0.0:14540", "--walk", "30"]) == 1
+    page = capsys.readouterr().out
+    assert "0 samples a second are received" in page
+    assert "no DISTANCE_SENSOR that looks down is received" in page
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
+        (["doctor", "--walk", "5"], "--walk 5: must be from 10 to 300"),
         (["doctor", "--drone", "udp://:14540"], "bad drone address"),
         (["doctor", "--seconds", "1"], "--seconds 1: must be from 2 to 600"),
         (["camera", "--port", "0"], "--port 0: must be from 1 to 65535"),

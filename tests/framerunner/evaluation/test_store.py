@@ -1,6 +1,7 @@
 """The folder of an evaluation: what was kept is read again after kills, damage and full disks."""
 
 import os
+from dataclasses import replace
 from math import inf
 
 import pytest
@@ -39,7 +40,8 @@ def kept(path, plan, **options):
 
 
 def test_rows_are_found_again_in_the_order_of_the_scenarios(tmp_path, plan):
-    failed = made_row("calm-3", "timed out", track=TRACK)
+    flown = replace(TRACK, true_path=[(0.0, 0.1, 0.2, 0.3)], estimated_path=[(0.0, 0.1, 0.2, 0.4)])
+    failed = made_row("calm-3", "timed out", track=flown)
     error = made_row("calm-2", "error", traceback="Traceback: this and that")
     keep(tmp_path / "a" / "b", plan, failed, made_row("calm-1"))
     keep(tmp_path / "a" / "b", plan, error)
@@ -47,7 +49,7 @@ def test_rows_are_found_again_in_the_order_of_the_scenarios(tmp_path, plan):
     assert kept(tmp_path / "a" / "b", plan) == whole  # but for track and traceback
     folder = read_folder(tmp_path / "a" / "b", "--compare")
     assert folder.identity == plan.identity
-    assert folder.track("calm-3") == TRACK
+    assert folder.track("calm-3") == flown
     assert folder.track("calm-1") == Track()
     assert folder.rows()["calm-3"].track is None
     assert folder.error_file("calm-2").read_text(encoding="utf-8") == "Traceback: this and that"

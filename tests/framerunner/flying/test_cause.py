@@ -1,5 +1,7 @@
 """The cause of a flight that was not clean: what happened, when, where, and what the navigator knew."""
 
+from dataclasses import replace
+
 import pytest
 
 from framerunner.flying.cause import CauseWatch, Flown
@@ -24,16 +26,17 @@ TRACK = Track(
     [0.5, 2.0, 2.0, 1.0],
     ["take_off", "red.crossing", "red.crossing", "green.search"],
 )
+TRACK_COLUMNS = (TRACK.time_s, TRACK.x, TRACK.y, TRACK.z)
 BEGAN_US = 1_000_000
 
 
-def words(report, ended="finished", reason="", views=()):
+def words(report, ended="finished", reason="", views=(), **paths):
     watch = CauseWatch()
     for time_s, view in views:
         state = DroneState(BEGAN_US + round(time_s * 1e6), 0.0, 0.0, 0.0, 0.0)
         watch.see(Moment(state, VelocityFluCommand(), Detections(), "", 1.0, navigation=view))
     end = MissionEnd(ended, reason, "green.search", 30.0, 600)
-    return watch.words(Flown(LAYOUT, RefereeReport(**report), end, TRACK, BEGAN_US))
+    return watch.words(Flown(LAYOUT, RefereeReport(**report), end, replace(TRACK, **paths), BEGAN_US))
 
 
 def touched(*names, **values):
@@ -101,6 +104,29 @@ def touched(*names, **values):
 )
 def test_the_cause_is_one_line(report, ended, views, expected):
     assert words(report, ended, "the camera is lost" if ended == "aborted" else "", views) == expected
+
+
+def test_a_place_that_was_off_is_the_cause_rather_than_the_map():
+    """The drone believes to be at (3, 2, 2), and is 40 cm beside that; so is all that it has seen."""
+    true_path = [(t, x, y - 0.4, z) for t, x, y, z in zip(*TRACK_COLUMNS, strict=True)]
+    seen = replace(RED, position_m=(3.0, 2.43, 2.0))
+    drifted = words(touched("red"), views=[(5.0, NavigationView((seen,)))], true_path=true_path)
+    assert drifted == (
+        "touched red at 10.0 s in red.crossing at (3.00, 1.60, 2.00), the place being off by 40 cm, and from "
+        "there the map had red 3.0 cm and 5.7° off"
+    )
+    crashed = words({"verdict": "crashed", "try_time_s": 20.0}, true_path=true_path)
+    assert crashed.endswith("at (5.50, -0.40, 2.00), the place being off by 40 cm")
+
+
+def test_an_estimated_place_counts_before_the_reported_one():
+    true_path = [(t, x, y - 0.4, z) for t, x, y, z in zip(*TRACK_COLUMNS, strict=True)]
+    estimated = [(t, x, y + 0.02, z) for t, x, y, z in true_path]
+    seen = replace(RED, position_m=(3.0, 2.03, 2.0))
+    told = words(
+        touched("red"), views=[(5.0, NavigationView((seen,)))], true_path=true_path, estimated_path=estimated
+    )
+    assert told.endswith("at (3.00, 1.60, 2.00), which the map had 3.0 cm and 5.7° off")
 
 
 def test_a_result_says_why_it_was_not_clean():

@@ -5,6 +5,7 @@ from math import cos, hypot, sin
 
 import pytest
 
+from framerunner.commands import with_sensors
 from framerunner.flying.lockstep import LockstepVehicle, fly_lockstep
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.response import ResponseDelay
@@ -93,3 +94,17 @@ def test_a_path_leads_on_from_a_gate_to_where_the_search_for_the_next_begins():
     x, y, z = (end - at for end, at in zip(ends_m[-1], red.position_arena_m, strict=True))
     across_m = hypot(cos(red.yaw_rad) * y - sin(red.yaw_rad) * x, z)
     assert across_m > 0.3  # it does not only end straight behind
+
+
+def test_a_result_says_how_exactly_a_drone_that_drifts_knew_its_place():
+    scenario = with_sensors(load_scenario("calm-17"), "flow")
+    flown = fly_lockstep(FlightPlan(scenario, load_mission("explorer"), 4))
+    result, track = flown.result, flown.track
+    assert len(result.place_errors_m) == len(result.crossing_times_s)
+    assert max(*result.place_errors_m, result.last_place_error_m) < result.largest_reported_error_m
+    assert result.largest_reported_error_m == pytest.approx(
+        track.largest_error_m(track.reported_path), abs=1e-4
+    )
+    assert 0.0 < result.largest_place_std_m < 2.0
+    for time_s, error_m in zip(result.crossing_times_s, result.place_errors_m, strict=True):
+        assert hypot(*track.place_error_m(time_s)) == pytest.approx(error_m, abs=1e-4)

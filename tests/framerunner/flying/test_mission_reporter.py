@@ -229,6 +229,7 @@ def test_the_navigator_s_map_is_sent_twice_a_second_when_it_has_changed():
             }
         ],
         "path": [[0.0, 0.0, 1.0], [3.0, 2.0, 2.0]],
+        "place": None,
     }
     listener.sending = (DocumentKind.MAP,)
     reporter.see(moment(39, navigation=first))

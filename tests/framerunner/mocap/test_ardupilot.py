@@ -26,7 +26,7 @@ class HandHeldSource:
 
     def __init__(self, vehicle, *, delay_s=0.0, velocity=None, turned_deg=0.0):
         self.label, self.ended, self.fault, self.faults, self.needs_truth = "tracking", False, "", 0, False
-        self.stopped = False
+        self.stopped, self.streams_hz, self.failure = False, {}, ""
         self._vehicle, self._delay_us, self._velocity = vehicle, round(delay_s * 1e6), velocity
         half = turned_deg * pi / 360.0
         self._turn = (cos(half), 0.0, 0.0, sin(half))

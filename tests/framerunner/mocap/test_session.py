@@ -32,7 +32,7 @@ class TrackingSource:
 
     def __init__(self, simulation, delay_s=0.0):
         self.label, self.ended, self.fault, self.faults, self.needs_truth = "tracking", False, "", 0, False
-        self.stopped = False
+        self.stopped, self.streams_hz, self.failure = False, {}, ""
         self._simulation, self._delay_s = simulation, delay_s
         self._waiting = []
 

@@ -15,7 +15,7 @@ from framerunner.flying.mission_reporter import MissionReporter
 from framerunner.monitor.vehicle.mission import MissionView
 from framerunner.wire.mission_tunnel import DOCUMENT_TYPE
 from offboard.app import Moment
-from offboard.drone import DroneState, VelocityFluCommand
+from offboard.drone import DroneState, PlaceEstimate, VelocityFluCommand
 from offboard.mission import load_mission, mermaid
 from offboard.navigation.view import GateEstimate, NavigationView
 from scenarios.loader import load_scenario
@@ -387,7 +387,8 @@ def reported_map():
     pipe = Pipe()
     reporter = MissionReporter(pipe, MISSION, "", "test-case-1")
     seen = Moment(DroneState(0, 0.0, 0.0, 1.0, 0.0), VelocityFluCommand(), Detections(), "red.turning", 0.0)
-    reporter.see(replace(seen, navigation=view))
+    place = PlaceEstimate((0.4, 0.1, 1.0), 0.1, (0.04, 0.0, 0.0, 0.0, 0.09, 0.0, 0.0, 0.0, 0.01), 0.05)
+    reporter.see(replace(seen, navigation=view, place=place))
     (message,) = (each for each in pipe.told if each["kind"] == "map")
     return message
 
@@ -407,14 +408,32 @@ async def test_the_navigators_map_is_drawn_from_above_and_can_be_switched_off(ch
     assert [await each.get_attribute("stroke") for each in await mapped.all()] == ["#ff0000", "#7a7a7a"]
     await expect(mapped.locator("ellipse")).to_have_count(1)
     assert len((await path.get_attribute("points")).split()) == 2
+    around = page.locator(".m-topview [data-place] ellipse")  # of two standard deviations
+    wide, high = [float(await around.get_attribute(name)) for name in ("rx", "ry")]
+    assert high / wide == pytest.approx(0.3 / 0.2)
     await button.click()
+    await expect(around).to_have_count(0)
     await expect(path).to_have_count(0)
     await expect(mapped).to_have_count(0)
     await expect(goal).to_be_hidden()
     await button.click()
     await expect(goal).to_be_visible()
-    await fake.say(**message | {"goal": "", "frames": [], "path": []})
+    await fake.say(**message | {"goal": "", "frames": [], "path": [], "place": None})
     await expect(button).to_be_hidden()
+    assert complaints == []
+
+
+async def test_where_a_simulated_drone_truly_is_is_a_thin_line(chromium, fake):
+    fake.welcome = [world(), chart(), {"kind": "status", "drones": [status()]}]
+    page, complaints = await visit(chromium, fake, script=WITHOUT_WEBGL)
+    for tick in range(4):
+        truth = [0.1 * tick, 1.0, 1.0] if tick else None
+        await fake.say(
+            kind="pose", drones=[pose(t=10.0 + 0.05 * tick, p=[0.1 * tick, 0.5, 1.0], truth=truth)]
+        )
+    line = page.locator(".m-topview .t-truth")
+    await expect(line).to_have_count(1)
+    await until(page, "document.querySelector('.t-truth').getAttribute('points').split(' ').length === 3")
     assert complaints == []
 
 

@@ -16,12 +16,14 @@ from framerunner.monitoring import run_library
 from framerunner.monitoring.read_run import RECORDING, read_run
 from framerunner.monitoring.run_library import RunFolders
 from framerunner.recording.mcap_writer import FlightRecording
+from framerunner.runs.track import Track
 from framerunner.wire.mission_report import TransitionTaken
 from offboard.app import Moment
-from offboard.drone import DroneState, VelocityFluCommand
+from offboard.drone import DroneState, PlaceEstimate, VelocityFluCommand
 from offboard.mission import load_mission
 from offboard.navigation.view import GateEstimate, NavigationView
 from scenarios.loader import load_scenario
+from scenarios.result import FlightResult
 from vision.types import Detections
 
 GREEDY = """
@@ -145,6 +147,7 @@ def test_what_could_not_be_read_is_not_read_again_until_it_changes(tmp_path, mon
 def test_the_navigators_map_of_a_recording_is_listed_when_it_changes(tmp_path):
     gate = GateEstimate("red", (3.0, 2.0, 2.0), 0.5, (inf, inf, inf), 0.1, True, False, 1, 0)
     views = [None, NavigationView(goal="explore"), NavigationView((gate,), ((0.0, 0.0, 1.0),), "cross red")]
+    place = PlaceEstimate((0.2, 0.1, 1.0), 0.1, (0.04, 0.0, 0.0, 0.0, 0.09, 0.0, 0.0, 0.0, 0.01), 0.05)
     folder, target = tmp_path / "flight", tmp_path / "target"
     folder.mkdir()
     target.mkdir()
@@ -153,9 +156,21 @@ def test_the_navigators_map_of_a_recording_is_listed_when_it_changes(tmp_path):
         for tick in range(30):
             state = DroneState(50_000 * tick, 0.0, 0.0, 1.0, 0.0)
             moment = Moment(state, VelocityFluCommand(), Detections(), "a.b", 0.05 * tick)
-            recording.see(replace(moment, navigation=views[tick // 10]))
+            recording.see(replace(moment, navigation=views[tick // 10], place=place if tick >= 20 else None))
+        still = [0.0] * 30
+        times_s = [0.05 * tick for tick in range(30)]
+        true_path = [(0.0, 0.0, 0.5, 1.0), (1.0, 1.0, 0.5, 1.0)]
+        track = Track(times_s, still, still, still, ["a.b"] * 30, true_path=true_path)
+        recording.finish(FlightResult(verdict="clean"), track)
     read_run(folder, target)
-    maps = json.loads((target / RECORDING).read_text())["maps"]
+    run = json.loads((target / RECORDING).read_text())
+    assert run["poses"][10]["p"] == [0.0, 0.0, 1.0]
+    assert run["poses"][10]["truth"] == pytest.approx([0.5, 0.5, 1.0])
+    maps = run["maps"]
+    assert [each["place"] for each in maps] == [
+        None,
+        {"p": [0.2, 0.1, 1.0], "yaw": 0.1, "std": [0.2, 0.3, 0.1], "yaw_std": 0.05},
+    ]
     assert [(each["t"], each["goal"]) for each in maps] == [(0.5, "explore"), (1.0, "cross red")]
     assert (maps[1]["frames"][0]["p"], maps[1]["frames"][0]["std"]) == ([3.0, 2.0, 2.0], None)
     assert maps[1]["path"] == [[0.0, 0.0, 1.0]]

@@ -17,8 +17,8 @@ class BenchLink:
 
     url = "udpin://bench"
 
-    def __init__(self, scenario, lost=lambda message: False):
-        self.simulation = Simulation(scenario)
+    def __init__(self, scenario, lost=lambda message: False, simulation=None):
+        self.simulation = simulation or Simulation(scenario)
         self.node = MavlinkNode(self.simulation.autopilot, (ONBOARD, GROUND))
         self.sent = []
         self.lost = lost

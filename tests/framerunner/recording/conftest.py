@@ -41,7 +41,7 @@ def record(path):
             recording.see_image(time_us, image)
 
         flown = fly_lockstep(FlightPlan(scenario, mission, SEED), observers=(observe,), on_image=keep)
-        recording.finish(flown.result, flown.track.time_s)
+        recording.finish(flown.result, flown.track)
     assert recording.problem == ""
     return Recorded(path, flown, moments, images)
 

@@ -2,6 +2,7 @@
 
 import json
 from base64 import b64decode
+from dataclasses import replace
 from math import inf, nan, pi
 
 import cv2
@@ -11,7 +12,7 @@ import pytest
 from mcap.reader import make_reader
 
 from framerunner.geometry.gate_shape import GateShape
-from framerunner.recording.events import Crossed, RecordedImage, RecordingError
+from framerunner.recording.events import Crossed, RecordedImage, RecordingError, TruePlace
 from framerunner.recording.mcap_reader import McapRecording
 from framerunner.recording.mcap_writer import FlightRecording
 from framerunner.recording.recording_messages import (
@@ -24,8 +25,9 @@ from framerunner.recording.recording_messages import (
     time_of,
 )
 from framerunner.recording.schemas import TOPICS, schema_texts
+from framerunner.runs.track import Track
 from offboard.app import Moment
-from offboard.drone import DroneState, VelocityFluCommand
+from offboard.drone import DroneState, PlaceEstimate, VelocityFluCommand
 from offboard.mission import load_mission
 from offboard.navigation.view import GateEstimate, NavigationView
 from scenarios.loader import load_scenario, parse_scenario
@@ -51,6 +53,11 @@ def messages(path, *topics):
             (channel.topic, message.log_time, json.loads(message.data))
             for _, channel, message in make_reader(file).iter_messages(topics or None)
         ]
+
+
+def track_at(*times_s, **paths):
+    still = [0.0] * len(times_s)
+    return Track(times_s, still, still, still, [""] * len(times_s), **paths)
 
 
 def moment_at(time_us, state="a.b", **fields):
@@ -101,7 +108,14 @@ def test_every_message_is_as_its_schema_says(recorded):
             validators[schema.name].validate(content)
             assert content.keys() <= json.loads(schema.data)["properties"].keys()
             seen.add(channel.topic)
-    assert seen == TOPICS.keys() - {"/crossing", "/map", "/map/scene", "/path"}
+    assert seen == TOPICS.keys() - {
+        "/crossing",
+        "/estimate",
+        "/estimate/scene",
+        "/map",
+        "/map/scene",
+        "/path",
+    }
 
 
 def test_counts_and_times_are_those_of_the_flight(recorded):
@@ -170,7 +184,7 @@ def test_crossings_have_the_vehicle_time_at_which_they_were_flown(tmp_path):
     with new_recording(path) as recording:
         recording.see(moment_at(3_000_000))
         recording.see(moment_at(12_000_000))
-        recording.finish(RESULT, [-0.5, 8.5])  # so the try began at 3.5 s
+        recording.finish(RESULT, track_at(-0.5, 8.5))  # so the try began at 3.5 s
     assert [(time_ns, content["colour"]) for _, time_ns, content in messages(path, "/crossing")] == [
         (5_000_000_000, "red"),
         (7_750_000_000, "green"),
@@ -179,6 +193,32 @@ def test_crossings_have_the_vehicle_time_at_which_they_were_flown(tmp_path):
     crossed = [event for event in recording.events() if isinstance(event, Crossed)]
     recording.close()
     assert crossed == [Crossed(5_000_000, "red"), Crossed(7_750_000, "green")]
+
+
+def test_where_the_app_estimated_the_drone_to_be_and_where_it_was_are_read_back(tmp_path):
+    place = PlaceEstimate((1.2, 2.0, 0.5), 0.3, (0.04, 0.01, 0.0, 0.01, 0.09, 0.0, 0.0, 0.0, 0.01), 0.05)
+    moments = [
+        replace(moment_at(3_000_000 + 50_000 * tick), place=place if tick else None) for tick in (0, 1)
+    ]
+    path = tmp_path / "flight.mcap"
+    with new_recording(path) as recording:
+        for moment in moments:
+            recording.see(moment)
+        recording.finish(RESULT, track_at(0.0, 0.05, true_path=[(0.0, 1.0, 2.0, 0.4), (0.1, 1.1, 2.0, 0.4)]))
+    for topic, _, content in messages(path, "/estimate", "/estimate/scene", "/truth"):
+        jsonschema.validate(content, json.loads(schema_texts()[TOPICS[topic]]))
+    (scene_message,) = messages(path, "/estimate/scene")
+    assert scene_message[2]["entities"][0]["spheres"][0]["size"] == pytest.approx(
+        {"x": 0.8, "y": 1.2, "z": 0.4}
+    )
+    recording = McapRecording(path)
+    events = list(recording.events())
+    recording.close()
+    assert [event for event in events if isinstance(event, Moment)] == moments
+    assert [event for event in events if isinstance(event, TruePlace)] == [
+        TruePlace(3_000_000, (1.0, 2.0, 0.4)),
+        TruePlace(3_100_000, (1.1, 2.0, 0.4)),
+    ]
 
 
 def test_the_map_and_the_path_are_written_when_they_change_and_read_back(tmp_path):
@@ -324,7 +364,7 @@ def test_a_full_disk_stops_the_recording_only(tmp_path):
         for tick in range(20):
             recording.see(moment_at(2_000_000 + 50_000 * tick))
             recording.see_image(2_000_000 + 50_000 * tick, noise)
-        recording.finish(RESULT, [0.0])
+        recording.finish(RESULT, track_at(0.0))
     assert recording.problem == "recording stopped: No space left on device"
 
 

@@ -125,6 +125,20 @@ def test_the_legend_has_the_states_in_order_of_appearance():
     ]
 
 
+@pytest.mark.parametrize(("beside_m", "label"), [(0.9, "as reported, up to 0.90 m off"), (0.02, None)])
+def test_the_path_is_the_true_one_and_what_a_drone_that_drifts_reports_is_beside_it(beside_m, label):
+    true_path = [
+        (t, x, y + beside_m * t / 4, z)
+        for t, x, y, z in zip(TRACK.time_s, TRACK.x, TRACK.y, TRACK.z, strict=True)
+    ]
+    figure = draw_track(SCENARIO, replace(TRACK, true_path=true_path), RESULT)
+    entries = legend_entries(figure)
+    assert (label in entries) if label else not any(entry.startswith("as reported") for entry in entries)
+    path = coloured_line(figure, 0, STATE_COLOURS[2])  # of the crossing, and there the mark of red's
+    assert list(path.get_ydata()[:2]) == pytest.approx([2.0 + beside_m / 2, 2.5 + beside_m * 3 / 4])
+    assert any(list(line.get_ydata()) == [pytest.approx(2.0 + beside_m / 2)] for line in figure.axes[0].lines)
+
+
 def test_estimated_gates_are_drawn_beside_the_true_ones():
     red = GateEstimate("red", (3.5, 1.0, 2.0), pi / 2, (0.25, 0.5, 0.1), 0.1, False, True, 9, 0)
     other = GateEstimate("constructor", (0.0, 0.0, 1.0), 0.0, (inf, 1.0, 1.0), 0.1, False, False, 1, 0)

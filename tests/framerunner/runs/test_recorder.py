@@ -10,7 +10,7 @@ import pytest
 from framerunner.runs.recorder import FlightRecorder, RecordingCamera, VideoFile
 from framerunner.runs.track import TrackRecorder
 from offboard.app import Moment
-from offboard.drone import DroneState, VelocityFluCommand
+from offboard.drone import DroneState, PlaceEstimate, VelocityFluCommand
 from offboard.navigation.view import GateEstimate, NavigationView
 from tests.disk import disk_that_takes
 from vision.types import CameraFrame, Detections
@@ -53,6 +53,20 @@ def test_the_track_has_the_gates_as_they_were_last_estimated():
         view = None if known is None else NavigationView(tuple(known))
         recorder.see(replace(moment(5_000_000 + 50_000 * tick, "a.b"), navigation=view))
     assert recorder.track(None).estimates == (gates[1],)
+
+
+def test_the_track_has_the_estimated_path_and_the_largest_deviation():
+    recorder = TrackRecorder()
+    places = (None, (0.04, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.01), (0.0,) * 8 + (0.09,), None)
+    for tick, covariance in enumerate(places):
+        place = None if covariance is None else PlaceEstimate((tick, 0.5, 1.0), 0.0, covariance, 0.1)
+        recorder.see(replace(moment(5_000_000 + 50_000 * tick), place=place))
+    track = recorder.track(5_000_000, true_path=[(0.0, 0.0, 0.5, 1.0), (0.2, 4.0, 0.5, 1.4)])
+    assert track.estimated_path == [(0.05, 1, 0.5, 1.0), (0.1, 2, 0.5, 1.0)]
+    assert recorder.largest_std_m == pytest.approx(0.3)
+    assert track.largest_error_m(track.estimated_path) == pytest.approx(0.2)
+    assert track.place_error_m(0.1) == pytest.approx((0.0, 0.0, -0.2))  # as estimated
+    assert track.place_error_m(0.15) == pytest.approx((-3.0, 1.5, 1.7))  # as reported
 
 
 def test_the_real_time_factor_is_vehicle_time_by_wall_time(monkeypatch):

@@ -1,12 +1,20 @@
 """The way home of a drone that does not know its place."""
 
-from dataclasses import replace
 from math import atan2, cos, hypot, pi, remainder, sin
 
 import pytest
 
 from offboard.drone import DroneState
-from offboard.navigation.base_approach import BEFORE_M, LOOK_S, PLACES, SEARCH_S, SIGHTINGS, WayHome
+from offboard.navigation.base_approach import (
+    BEFORE_M,
+    FARTHER_M,
+    PLACES,
+    REACH_S,
+    ROUNDS,
+    SEARCH_S,
+    SIGHTINGS,
+    WayHome,
+)
 from scenarios.models import Arena, Base
 
 BASE = Base(x_m=1.0, y_m=-2.0)
@@ -50,22 +58,33 @@ def test_the_base_is_looked_at_from_before_it_and_then_landed_on() -> None:
     assert not way.looks
 
 
-def test_one_that_is_not_seen_is_looked_for_from_other_sides_before_it_lands() -> None:
-    way, time_s, sides = WayHome(BASE, Arena()), 10.0, []
-    here = state_at(-3.0, 0.0, 1.0)
-    place = way.goal(GOAL_M, here, NOT_SEEN, no_path=False)
+def test_one_that_is_not_seen_is_looked_for_from_other_sides_again_and_again_before_it_lands() -> None:
+    way, time_s = WayHome(BASE, Arena()), 10.0
+    place = way.goal(GOAL_M, state_at(-3.0, 0.0, 1.0), NOT_SEEN, no_path=False)
+    sides: list[float] = []
+    looked = []
     while way.looks:
         x, y, _ = place.position_m
-        sides.append(atan2(y - BASE.y_m, x - BASE.x_m))
-        assert away_m(place.position_m) == pytest.approx(BEFORE_M)
-        for _ in range(2):
-            there = replace(state_at(*place.position_m), time_us=round(time_s * 1e6))
-            place = way.goal(GOAL_M, there, NOT_SEEN, no_path=False)
-            time_s += LOOK_S + 0.1
+        side = atan2(y - BASE.y_m, x - BASE.x_m)
+        if not any(abs(remainder(side - other, 2 * pi)) < 0.1 for other in sides):
+            sides.append(side)
+        looked.append(away_m(place.position_m))
+        here = place
+        while place == here:
+            time_s += 0.2
+            place = way.goal(GOAL_M, state_at(*here.position_m, time_s), NOT_SEEN, no_path=False)
     assert place.position_m == GOAL_M
-    assert len(sides) == PLACES
-    turns = [abs(remainder(one - other, 2 * pi)) for k, one in enumerate(sides) for other in sides[:k]]
-    assert min(turns) > 0.5
+    assert len(sides) >= PLACES
+    assert looked == pytest.approx([BEFORE_M, FARTHER_M] * PLACES * ROUNDS)
+
+
+def test_a_place_that_is_not_reached_is_given_up() -> None:
+    way, here = WayHome(BASE, Arena()), state_at(-3.0, 0.0, 1.0)
+    place = way.goal(GOAL_M, here, NOT_SEEN, no_path=False)
+    for time_s in (11.0, 9.9 + REACH_S):
+        assert way.goal(GOAL_M, state_at(-3.0, 0.0, 1.0, time_s), NOT_SEEN, no_path=False) == place
+    later = state_at(-3.0, 0.0, 1.0, 10.1 + REACH_S)
+    assert way.goal(GOAL_M, later, NOT_SEEN, no_path=False) != place
 
 
 def test_places_are_inside_the_arena() -> None:
@@ -90,12 +109,15 @@ def test_a_new_way_looks_again() -> None:
     assert way.looks
 
 
-def test_one_that_is_not_seen_is_first_looked_for_farther_around() -> None:
+def test_one_that_is_not_seen_is_first_looked_for_farther_around_and_from_farther_away() -> None:
     way = WayHome(BASE, Arena())
     place = way.goal(GOAL_M, state_at(-3.0, 0.0, 1.0), NOT_SEEN, no_path=False)
-    for time_s, searches in ((10.0, False), (10.1 + SEARCH_S, True), (10.0 + LOOK_S + SEARCH_S, True)):
-        assert way.goal(GOAL_M, state_at(*place.position_m, time_s), NOT_SEEN, no_path=False) == place
-        assert way.searches == searches
-    elsewhere = state_at(*place.position_m, 10.2 + LOOK_S + SEARCH_S)
-    assert way.goal(GOAL_M, elsewhere, NOT_SEEN, no_path=False) != place
+    assert way.goal(GOAL_M, state_at(*place.position_m, 10.0), NOT_SEEN, no_path=False) == place
     assert not way.searches
+    farther = way.goal(GOAL_M, state_at(*place.position_m, 10.1 + SEARCH_S), NOT_SEEN, no_path=False)
+    assert way.searches
+    assert farther.yaw_rad == pytest.approx(place.yaw_rad)
+    assert away_m(farther.position_m) == pytest.approx(FARTHER_M)
+    way.goal(GOAL_M, state_at(*farther.position_m, 13.0), NOT_SEEN, no_path=False)
+    seen_there = way.goal(GOAL_M, state_at(*farther.position_m, 13.5), SEEN, no_path=False)
+    assert seen_there.position_m == GOAL_M

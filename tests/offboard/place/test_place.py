@@ -23,6 +23,11 @@ MOCAP = ReportedAccuracy(0.003, 0.003, 0.01, 0.01, 0.006)
 RED, GREEN = gate_at(2.5, 0.5, 1.2, 0.2), gate_at(1.5, -2.0, 1.4, 0.9, "green")
 
 
+def std_m(state):
+    """Of the coordinate that is known worst."""
+    return max(state.estimate.position_std_m)
+
+
 def truth(time_s):
     """Position and yaw of a drone that looks at both gates, by turns, and flies to and fro."""
     t = max(0.0, time_s - 1.0)  # it stands before
@@ -152,7 +157,7 @@ def test_the_error_of_the_place_stays_within_what_is_stated():
         states, _ = fly(Vehicle(seed))
         flying = [s for s in states if not s.landed]
         wrong = errors(states)
-        stated = np.array([s.position_std_m for s in flying])
+        stated = np.array([std_m(s) for s in flying])
         assert (stated > 0.0).all()
         inside += (np.abs(wrong) < 3.0 * stated[:, None]).all(axis=1).tolist()
         squares.append(float((wrong[-100:, :2] ** 2).sum(axis=1).mean()))
@@ -173,14 +178,14 @@ def test_a_gate_is_where_it_is_seen_from_the_drone_though_both_have_drifted():
         true_x, true_y = turned(gate.x_m - place[0], gate.y_m - place[1], -yaw)
         assert hypot(x - true_x, y - true_y) < max(0.02, 4.0 * max(known.position_std_m))
         assert max(known.position_std_m) < 0.03  # that of the drone in the arena is larger
-    assert now.position_std_m > max(known.position_std_m)  # it has drifted with its gates
+    assert std_m(now) > max(known.position_std_m)  # it has drifted with its gates
 
 
 def test_what_the_vehicle_reports_too_much_of_its_velocity_is_told():
     vehicle = Vehicle(1)
     vehicle.state = constant_error(vehicle, (0.12, 0.0, 0.0))
     _, world = fly(vehicle)
-    forward, left, _ = world.velocity_error_flu_m_s
+    forward, left, _ = world.localization.velocity_error_flu_m_s
     assert hypot(forward, left) == pytest.approx(0.12, abs=0.04)
 
 
@@ -203,7 +208,7 @@ def test_a_vehicle_that_knows_its_place_or_sends_no_samples_is_believed(vehicle)
     for time_us in range(TICK_US, 3_000_000, TICK_US):
         state = vehicle.state(time_us)
         assert world.observe(state, ()) is state
-    assert world.velocity_error_flu_m_s == (0.0, 0.0, 0.0)
+    assert world.localization.velocity_error_flu_m_s == (0.0, 0.0, 0.0)
 
 
 def test_a_vehicle_that_loses_its_motion_capture_is_not_believed_any_longer():
@@ -212,7 +217,7 @@ def test_a_vehicle_that_loses_its_motion_capture_is_not_believed_any_longer():
         Vehicle(2, accuracy=MOCAP),
         change=lambda state: replace(state, accuracy=lost) if state.time_us > 5_000_000 else state,
     )
-    is_estimated = [state.position_std_m > 0.0 for state in states]
+    is_estimated = [state.estimate is not None for state in states]
     assert is_estimated == [state.time_us > 5_000_000 for state in states]
     assert np.abs(errors(states)[-40:]).max() < 0.3
 
@@ -235,8 +240,8 @@ def test_samples_that_are_lost_for_a_while_make_the_place_less_sure_and_do_not_b
 
     states, _ = fly(Vehicle(5), change=lose)
     by_time = {state.time_us: state for state in states}
-    assert by_time[7_600_000].position_std_m > by_time[5_900_000].position_std_m
-    stated = np.array([s.position_std_m for s in states if not s.landed])
+    assert std_m(by_time[7_600_000]) > std_m(by_time[5_900_000])
+    stated = np.array([std_m(s) for s in states if not s.landed])
     assert np.abs(errors(states)[-40:]).max() < 3.0 * stated[-40:].max()
 
 
@@ -248,8 +253,8 @@ def test_a_vehicle_whose_samples_end_in_flight_is_followed_by_its_reports():
     reported = [drifting.state(time_us) for time_us in range(TICK_US, 16_000_000, TICK_US)]
     moved = errors(states)[-1] - errors(reported)[-1]
     assert np.abs(moved).max() < 0.4  # as far from the reports as when the samples ended
-    assert states[-1].position_std_m > 0.2
-    assert hypot(*world.velocity_error_flu_m_s) < 0.1
+    assert std_m(states[-1]) > 0.2
+    assert hypot(*world.localization.velocity_error_flu_m_s) < 0.1
 
 
 def test_the_same_flight_gives_the_same_estimate():
@@ -268,4 +273,47 @@ def test_what_has_another_colour_than_the_task_s_gates_does_not_move_the_drone()
     states, _ = fly(Vehicle(6), gates=gates)
     alone, _ = fly(Vehicle(6), gates=lambda _: ())
     assert np.abs(errors(states)[-1]).max() < 0.3
-    assert states[-1].position_std_m > 0.9 * alone[-1].position_std_m
+    assert std_m(states[-1]) > 0.9 * std_m(alone[-1])
+
+
+NEAR_RED = gate_at(1.4, 0.1, 1.2, 0.2)
+UNSEEN_S, SEEN_AGAIN_S, END_S = 12.0, 16.0, 18.0
+
+
+def fly_by_gate(end_s, *, stays):
+    """The drone in the arena and in flight, and the gate in flight: it is not seen for a while."""
+    vehicle = Vehicle(8)
+    world = WorldModel(Surroundings(Arena(), Base(), Camera()), CONTEST)
+    flown = []
+    for time_us in range(TICK_US, round(1e6 * end_s), TICK_US):
+        image_us = time_us - LATE_US
+        blind = UNSEEN_S < image_us * 1e-6 < SEEN_AGAIN_S
+        is_due = image_us > 0 and image_us % IMAGE_US == 0 and not blind
+        images = (vehicle.image(image_us, (NEAR_RED,)),) if is_due else ()
+        if stays:
+            world.localization.stay_by("red")
+        state = world.observe(vehicle.state(time_us), images)
+        at = world.localization.state_in_flight(state)
+        if time_us > 1e6 * UNSEEN_S:
+            gate = world.gate("red")
+            flown.append([(s.x, s.y, s.z) for s in (state, at)] + [gate.position_m])
+    return np.array(flown).transpose(1, 0, 2)
+
+
+def steps_m(places):
+    return np.linalg.norm(np.diff(places, axis=0), axis=1)
+
+
+def test_a_correction_of_the_place_does_not_move_the_drone_in_flight_while_it_is_by_a_gate():
+    arena, flown, gate = fly_by_gate(END_S, stays=True)
+    assert steps_m(arena).max() > 0.1  # else nothing was tested
+    assert steps_m(flown).max() < 0.04
+    assert np.abs(flown - arena)[-1].max() > 0.1
+    true = np.array((NEAR_RED.x_m, NEAR_RED.y_m)) - truth(END_S - 0.05)[0][:2]
+    assert (gate - flown)[-1, :2] == pytest.approx(true, abs=0.03)
+
+
+def test_away_from_a_gate_flight_comes_back_to_the_arena_after_a_correction():
+    arena, flown, _ = fly_by_gate(END_S + 1.5, stays=False)
+    assert steps_m(flown).max() < 0.06 < steps_m(arena).max()
+    assert np.abs(flown - arena)[-1].max() < 0.02

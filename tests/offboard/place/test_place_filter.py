@@ -11,15 +11,16 @@ from offboard.drone import ImuInterval
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.gates.gate_measurement import GateView
 from offboard.place.inertial_track import GRAVITY_M_S2, InertialTrack
-from offboard.place.measurements import Eye, corners, points, report, stands
-from offboard.place.place_filter import OWN, TURN, PlaceFilter
+from offboard.place.measurements import Eye, corners, points, report, size, stands
+from offboard.place.place_filter import OWN, TURN, TURN_SETTLING_RAD, PlaceFilter
 from scenarios.models import Camera
 
 CAMERA = CameraModel.of(Camera())
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 EYE = Eye(CAMERA, quaternion_from_euler(0.1, -0.05, 0.4), (0.02, -0.01, 0.03))
 BASE_M = np.array(((2.1, 0.4, 0.5), (2.1, 0.9, 0.5), (1.8, 0.2, 0.0)))
-STATE = np.array((0.1, -0.3, 1.2, 0.05, 0.5, -0.2, 0.1, 0.02, -0.01, 0.03, 2.1, 0.9, 1.4, 0.7))
+SEEN_FROM_M = np.array((-0.6, 0.1, 1.0))
+STATE = np.array((0.1, -0.3, 1.2, 0.05, 0.5, -0.2, 0.1, 0.02, -0.01, 0.03, 2.1, 0.9, 1.4, 0.7, 0.15))
 
 
 def tilted(time_s):
@@ -76,7 +77,7 @@ def test_a_heading_that_the_gyroscope_does_not_confirm_is_a_turn_of_the_reports(
     motion = track.between(0, 500_000)
     assert motion.turn_rad == pytest.approx(-0.04, abs=1e-9)
     place = PlaceFilter(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    place.predict(motion, settling=True)
+    place.predict(motion, TURN_SETTLING_RAD)
     assert -0.04 <= place.turn_rad < -0.038  # the gyroscope is believed while the vehicle corrects itself
 
 
@@ -115,8 +116,9 @@ def view(seen=(True, True, True, True)):
             (0.6, -0.1, 0.2), 0.1, 0.05, position_m=(0.2, 0.1, 1.3), height_std_m=0.05, position_std_m=0.01
         ),
         stands((0.2, 0.1, 1.0), 0.1, 0.01, 0.01, 0.01),
-        corners(view(), EYE, OWN, 0.0),
-        corners(view((True, False, False, True)), EYE, OWN, 0.0),
+        corners(view(), EYE, OWN, SEEN_FROM_M, 0.0),
+        corners(view((True, False, False, True)), EYE, OWN, SEEN_FROM_M, 0.0),
+        size(OWN, 0.1),
         points(BASE_M, np.array(((5.0, 60.0), (-40.0, 55.0), (20.0, 70.0))), np.eye(6), EYE, 0.003),
     ],
 )
@@ -157,8 +159,8 @@ def test_a_gate_is_known_as_well_from_the_drone_as_it_was_seen_however_far_that_
     place = PlaceFilter(0, (1.0, 2.0, 1.5), (0.0, 0.0, 0.0), position_std_m=0.5)
     place.p[TURN, TURN] = 0.1**2
     seen = np.diag((0.02, 0.01, 0.01, 0.03)) ** 2
-    place.add_gate("red", np.array((3.0, 1.0, 1.2, 0.3)), seen)
-    place.add_gate("blue", np.array((-3.0, 1.0, 1.2, 1.3)), seen)
+    place.add_gate("red", np.array((3.0, 1.0, 1.2, 0.3)), seen, 0.3)
+    place.add_gate("blue", np.array((-3.0, 1.0, 1.2, 1.3)), seen, 0.3)
     assert place.gate_from_drone("red") == pytest.approx(seen, abs=1e-9)
     assert place.p[OWN, OWN] > 0.25  # in the arena it is as uncertain as the drone
     place.drop_gate("red")
@@ -197,7 +199,7 @@ def test_a_place_that_is_far_off_is_found_by_known_corners_once_it_is_doubted():
 
 def test_a_doubted_place_is_known_as_well_as_before_relative_to_the_gates():
     place = PlaceFilter(0, (0.2, -0.4, 0.9), (0.0, 0.0, 0.0))
-    place.add_gate("red", np.array((2.0, 0.5, 1.2, 0.3)), 1e-4 * np.eye(4))
+    place.add_gate("red", np.array((2.0, 0.5, 1.2, 0.3)), 1e-4 * np.eye(4), 0.3)
     before, gate_m = place.gate_from_drone("red"), place.p[OWN, OWN]
     place.doubt((0.5, 0.5, 0.05), 0.07)
     assert place.gate_from_drone("red") == pytest.approx(before, abs=1e-9)

@@ -3,6 +3,7 @@
 import pytest
 
 from framerunner.cli import run
+from framerunner.preflight.kept import load_kept
 from framerunner.vehicle.airframe import load_airframe
 from sitl.px4.parameters import airframe_parameters, suite_parameters
 from sitl.sensors.suite import load_suite
@@ -41,8 +42,31 @@ def test_the_command_prints_them(capsys):
 
 
 @pytest.mark.parametrize(
+    ("suite", "wanted"),
+    [
+        (
+            "flow",
+            {"EKF2_OF_CTRL": 1, "EKF2_RNG_CTRL": 1, "EKF2_HGT_REF": 0, "EKF2_EV_CTRL": 0, "SYS_HAS_GPS": 0},
+        ),
+        ("mocap", {"EKF2_EV_CTRL": 15, "EKF2_HGT_REF": 3, "EKF2_TAU_POS": 0.1, "EKF2_RNG_CTRL": 0}),
+    ],
+)
+def test_those_of_a_real_drone_are_a_file_that_preflight_reads(suite, wanted, capsys, tmp_path):
+    assert run(["px4", "params", "--real", "--sensors", suite]) == 0
+    file = tmp_path / "position.params"
+    file.write_text(capsys.readouterr().out)
+    read = load_kept(file)
+    values = {each.name: each.value for each in read.parameters}
+    assert {name: values.get(name) for name in wanted} == wanted
+    assert not {"SIM_BAT_ENABLE", "CA_ROTOR_COUNT", "EKF2_MULTI_IMU"} & values.keys()
+    kinds = {each.name: each.kind for each in read.parameters}
+    assert kinds["SYS_HAS_GPS"] == 6
+
+
+@pytest.mark.parametrize(
     ("options", "message"),
     [
+        (["px4", "params", "--real", "--sensors", "outdoor"], "--sensors outdoor: a real drone indoors has"),
         (["sim", "--px4", "here"], "--px4 here: is for PX4; add --autopilot px4"),
         (["sim", "--autopilot", "px4", "--px4", "/no/px4"], "--px4 /no/px4: has no bin/px4"),
         (["sim", "--autopilot", "px4", "--count", "2"], "--count: PX4 flies one drone"),

@@ -46,6 +46,7 @@ def test_the_installed_suites_have_their_sensors():
         "ideal": set(),
         "mocap": common | {"external_pose"},
         "external": common | {"external_pose"},
+        "vio": common | {"external_pose"},
         "outdoor": common | {"magnetometer", "gps"},
         "flow": common | {"magnetometer", "optical_flow"},
         "flow-cheap": common | {"magnetometer", "optical_flow"},

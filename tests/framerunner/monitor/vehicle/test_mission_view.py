@@ -151,13 +151,19 @@ def map_of(view, **content):
 
 
 def test_the_map_of_another_mission_is_forgotten(view):
-    known = {"goal": "cross red", "frames": [MAPPED], "path": [[0.0, 0.0, 1.0], [3.0, 2.0, 2.0]]}
+    place = {"p": [1.0, 2.0, 0.5], "yaw": 0.25, "std": [0.2, 0.1, 0.05], "yaw_std": 0.03}
+    known = {
+        "goal": "cross red",
+        "frames": [MAPPED],
+        "path": [[0.0, 0.0, 1.0], [3.0, 2.0, 2.0]],
+        "place": place,
+    }
     (told,) = map_of(view, mission_crc=view._document_crc, time_us=9_250_000, **known)
     assert told == {"kind": "map", "id": 1, "t": 9.25, **known}
     assert view.take(state(view._document_crc), 10.0) == []
     assert view.standing()[-1] == told
     (empty,) = view.take(state(crc=1), 10.0)
-    assert empty == {"kind": "map", "id": 1, "t": 0.0, "goal": "", "frames": [], "path": []}
+    assert empty == {"kind": "map", "id": 1, "t": 0.0, "goal": "", "frames": [], "path": [], "place": None}
     assert [message["kind"] for message in view.standing()] == ["chart"]
 
 

@@ -255,3 +255,37 @@ def test_a_gate_is_not_taken_for_a_picture(seed: int) -> None:
         flight.look([gate], (-2.0 + 0.08 * step * cos(bearing), 0.08 * step * sin(bearing), 1.5), 0.0)
         assert flight.map.best("red") is not None or step < 10
     assert not flight.map.is_lookalike("red", LineOfSight((-2.0, gate.y_m, gate.z_m), (1.0, 0.0, 0.0)))
+
+
+@pytest.mark.parametrize("heading_deg", [0, 12, 60, -60])
+@pytest.mark.parametrize("size", [1.5, 1.9, 2.7])
+def test_a_larger_thing_elsewhere_is_never_certain(size: float, heading_deg: int) -> None:
+    """The drone looks around, flies on as to a gate, stops and looks around again."""
+    on_wall = picture(size, 7.0, 0.5, 1.8, pi)
+    for seed in range(3):
+        flight = Flight(seed)
+        for step in range(70):
+            along_m = 0.06 * (min(max(step - 10, 0), 20) + min(max(step - 45, 0), 20))
+            place = (
+                7.0 - 2.1 * size + along_m * cos(radians(heading_deg)),
+                along_m * sin(radians(heading_deg)),
+                1.2,
+            )
+            flight.look([on_wall], place, 0.3 * sin(0.7 * step))
+            assert not any(estimate.certain for estimate in flight.map.gates), (seed, step)
+
+
+def test_a_gate_is_certain_only_after_a_way_that_shows_its_size() -> None:
+    gate = gate_at(2.0, 0.0, 1.5, 0.4)
+    flight = Flight()
+    for step in range(30):
+        flight.look([gate], (0.5, 0.2, 1.4), 0.25 * sin(0.6 * step))
+    before = flight.map.best("red")
+    assert before is not None
+    assert before.views > 10
+    assert not before.certain
+    for step in range(8):
+        flight.look([gate], (0.5 + 0.05 * step, 0.2, 1.4), 0.25 * sin(0.6 * step))
+    after = flight.map.best("red")
+    assert after is not None
+    assert after.certain

@@ -8,6 +8,7 @@ import { reasonOf } from "../request.js";
  * @property {number} [id] 1 if there is none
  * @property {number} t seconds
  * @property {number[]} p x, y, z, metres, arena axes
+ * @property {number[]|null} [truth] where a simulated drone truly is; null: not known
  * @property {number[]} q w, x, y, z, body forward-left-up to arena
  * @property {number[]|null} [v] forward, left, up, m/s
  * @property {number|null} [r] rad/s to the left

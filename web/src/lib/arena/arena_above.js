@@ -14,6 +14,8 @@ export class ArenaAbove {
   #scenario = null;
   /** @type {Map<number, {place: number[], colour: string}[]>} */
   #trails = new Map();
+  /** @type {Map<number, number[][]>} where they truly were */
+  #truths = new Map();
   /** @type {Pose[]} */
   #poses = [];
   /** @type {number|null} */
@@ -61,13 +63,22 @@ export class ArenaAbove {
       if (!last || Math.hypot(x - last.place[0], y - last.place[1]) > STEP_M) trail.push({ place: [x, y], colour });
     }
     if (trail.length > MOST_POINTS) trail.splice(0, 1000);
+    const truth = this.#truths.get(id) ?? [];
+    this.#truths.set(id, truth);
+    for (const { on, truth: place } of poses) {
+      const last = truth.at(-1);
+      if (on && place && (!last || Math.hypot(place[0] - last[0], place[1] - last[1]) > STEP_M)) truth.push(place);
+    }
+    if (truth.length > MOST_POINTS) truth.splice(0, 1000);
     this.#ask();
   }
 
   /** @param {number} [id] */
   clearTrail(id) {
-    if (id === undefined) this.#trails.clear();
-    else this.#trails.delete(id);
+    for (const lines of [this.#trails, this.#truths]) {
+      if (id === undefined) lines.clear();
+      else lines.delete(id);
+    }
     this.#ask();
   }
 
@@ -93,6 +104,7 @@ export class ArenaAbove {
   #draw() {
     this.#isAsked = false;
     this.#view.setTracks([...this.#trails.values()].flatMap(inOneColour));
+    this.#view.setTruth([...this.#truths.values()]);
     for (const { id = 1, p, q, fresh = true } of this.#poses) {
       const isOther = this.#selected !== null && id !== this.#selected;
       this.#view.setDrone(id, p, yawOf(q), !fresh ? "old" : isOther ? "other" : "");

@@ -24,7 +24,8 @@ export class DroneModel {
     const thread = new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(), new THREE.Vector3(0, 0, 1)]);
     this.thread = new THREE.Line(thread, new THREE.LineBasicMaterial({ color: "#1c2733", transparent: true, opacity: 0.7 }));
     this.trail = new Ribbon(TRAIL_POINTS);
-    scene.add(this.group, this.shadow, this.thread, this.trail.mesh);
+    this.truth = new Ribbon(TRAIL_POINTS, { rim: 0.8 }); // where a simulated drone truly was
+    scene.add(this.group, this.shadow, this.thread, this.trail.mesh, this.truth.mesh);
     this.from = { p: new THREE.Vector3(), q: new THREE.Quaternion() };
     this.to = { p: new THREE.Vector3(), q: new THREE.Quaternion() };
     this.began = -1; // when it set out from `from`; -1: it has never been anywhere
@@ -94,7 +95,7 @@ export class DroneModel {
   }
 
   discard() {
-    for (const part of [this.group, this.shadow, this.thread, this.trail.mesh]) {
+    for (const part of [this.group, this.shadow, this.thread, this.trail.mesh, this.truth.mesh]) {
       part.traverse((/** @type {any} */ each) => { each.geometry?.dispose(); each.material?.dispose(); });
       part.removeFromParent();
     }

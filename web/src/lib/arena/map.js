@@ -16,10 +16,15 @@ import { GATE_COLOURS } from "../colours.js";
  * @property {string} goal what the navigator does
  * @property {MappedFrame[]} frames
  * @property {number[][]} path
+ * @property {EstimatedPlace|null} [place] where it takes the drone to be; null: where its vehicle reports
  */
+
+/** @typedef {{p: number[], std: number[]}} EstimatedPlace metres, arena axes */
 
 export const SIGMAS = 2; // how many standard deviations an ellipse reaches
 export const PATH_COLOUR = "#b3007d";
+export const PLACE_COLOUR = "#1a7fd6"; // of the drone's place as its app has estimated it
+export const TRUTH_COLOUR = "#101418"; // of where a simulated drone truly was
 const OTHER_COLOUR = "#7a7a7a"; // of a gate that is no part of the task
 const OUTER_M = [0.42, 0.22]; // width and height of a gate of which nobody tells them
 const AROUND = 1.35; // an outline is drawn so much larger, around the gate where the estimate is right
@@ -33,7 +38,8 @@ const [LEAST_M, MOST_M] = [0.005, 4]; // half axes of an ellipsoid
  * @returns {Message|null}
  */
 export function mapIn(message) {
-  return message.frames.length > 0 || message.path.length > 0 || message.goal !== "" ? message : null;
+  const isEmpty = message.frames.length === 0 && message.path.length === 0 && message.goal === "";
+  return isEmpty && !message.place ? null : message;
 }
 
 /** The colour in which a frame is drawn. @param {string} colour */
@@ -53,8 +59,8 @@ export function halfSizeOf(gate, scenario) {
 }
 
 /**
- * Half axes of the ellipsoid of a gate's place along x, y, z, metres; null if not known.
- * @param {MappedFrame} gate
+ * Half axes of the ellipsoid of a place along x, y, z, metres; null if not known.
+ * @param {{std: number[]|null}} place
  */
 export function halfAxesOf({ std }) {
   return std ? std.map((sigma) => Math.min(MOST_M, Math.max(LEAST_M, SIGMAS * sigma))) : null;

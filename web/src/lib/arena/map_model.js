@@ -1,7 +1,7 @@
 /** The navigator's map in three dimensions. */
 import * as THREE from "three";
 import { channels } from "../colours.js";
-import { colourOf, halfAxesOf, halfSizeOf, NORMAL_M, PATH_COLOUR } from "./map.js";
+import { colourOf, halfAxesOf, halfSizeOf, NORMAL_M, PATH_COLOUR, PLACE_COLOUR } from "./map.js";
 import { GAP, Ribbon } from "./ribbon.js";
 
 /**
@@ -44,6 +44,7 @@ export class MapModel {
       ball.removeFromParent();
     }
     for (const gate of map?.frames ?? []) this.#addGate(gate, scenario);
+    if (map?.place) this.#addBall(map.place, PLACE_COLOUR, 0.6);
     for (const point of map?.path ?? []) this.#path.add(point, rgbOf(PATH_COLOUR));
   }
 
@@ -64,8 +65,7 @@ export class MapModel {
     const rgb = rgbOf(colourOf(gate.colour));
     corners.forEach((corner, index) => this.#addLine(corner, corners[(index + 1) % 4], rgb, gate.certain ? 1 : DASHES));
     this.#addLine(at(-NORMAL_M, 0, 0), at(NORMAL_M, 0, 0), rgb, 1);
-    const axes = halfAxesOf(gate);
-    if (axes) this.#addBall(gate, axes);
+    this.#addBall(gate, colourOf(gate.colour));
   }
 
   /**
@@ -80,11 +80,13 @@ export class MapModel {
     }
   }
 
-  /** @param {MappedFrame} gate @param {number[]} axes its half axes, metres */
-  #addBall(gate, axes) {
-    const paint = { color: colourOf(gate.colour), transparent: true, opacity: 0.3, depthWrite: false };
+  /** @param {{p: number[], std: number[]|null}} place @param {string} colour @param {number} [opacity] */
+  #addBall(place, colour, opacity = 0.3) {
+    const axes = halfAxesOf(place);
+    if (!axes) return;
+    const paint = { color: colour, transparent: true, opacity, depthWrite: false };
     const ball = new THREE.Mesh(this.#ball, new THREE.MeshBasicMaterial(paint));
-    ball.position.fromArray(gate.p);
+    ball.position.fromArray(place.p);
     ball.scale.fromArray(axes);
     this.#balls.push(ball);
     this.group.add(ball);

@@ -4,6 +4,7 @@ import { onBeat, setPeriod } from "../beat.js";
 import { buildCone, buildWorld, discard, GROUND, SKY } from "./world.js";
 import { DroneModel, SIZE_M } from "./drone.js";
 import { ArenaEye } from "./eye.js";
+import { TRUTH_COLOUR } from "./map.js";
 import { MapModel } from "./map_model.js";
 import { channels } from "../colours.js";
 import { isDark, make, onTheme, setAttribute, setText, wantsStillness } from "../dom.js";
@@ -126,14 +127,21 @@ export class ArenaScene {
    * @param {ColourOf} colourOf
    */
   addTrail(id, poses, colourOf) {
-    const { trail } = this.#drone(id);
-    for (const pose of poses) if (pose.on) trail.add(pose.p, rgbOf(colourOf(pose)));
+    const { trail, truth } = this.#drone(id);
+    for (const pose of poses.filter(({ on }) => on)) {
+      trail.add(pose.p, rgbOf(colourOf(pose)));
+      if (pose.truth) truth.add(pose.truth, rgbOf(TRUTH_COLOUR));
+    }
     this.#ask();
   }
 
   /** @param {number} [id] */
   clearTrail(id) {
-    for (const [each, drone] of this.#drones) if (id === undefined || id === each) drone.trail.clear();
+    for (const [each, drone] of this.#drones) {
+      if (id !== undefined && id !== each) continue;
+      drone.trail.clear();
+      drone.truth.clear();
+    }
     this.#ask();
   }
 
@@ -295,7 +303,8 @@ export class ArenaScene {
     const isLarge = view === "orbit" && !this.#isTrueSize;
     drone.setScale(isLarge ? Math.min(MOST_TIMES, Math.max(1, SEEN_PX / (SIZE_M * metre_px))) : 1);
     drone.trail.fit(high > 600 ? 5 : 4, [wide, high]);
-    drone.trail.mesh.visible = drone.trail.isDrawn && !isOnboard;
+    drone.truth.fit(2, [wide, high]);
+    for (const line of [drone.trail, drone.truth]) line.mesh.visible = line.isDrawn && !isOnboard;
     const place = this.#drones.size > 1 && isThere && !isOwn ? this.#eye.toScreen(drone.group.position) : null;
     drone.label.hidden = place === null;
     setAttribute(drone.label, "data-selected", drone === chosen);

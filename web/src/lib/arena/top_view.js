@@ -2,7 +2,7 @@
 import "./top_view.css";
 import { svg } from "../diagram/shapes.js";
 import { number } from "../dom.js";
-import { colourOf, halfAxesOf, halfSizeOf, NORMAL_M, PATH_COLOUR } from "./map.js";
+import { colourOf, halfAxesOf, halfSizeOf, NORMAL_M, PATH_COLOUR, PLACE_COLOUR, TRUTH_COLOUR } from "./map.js";
 import { allGates, prismsOf } from "./obstacles.js";
 
 const MAP_PX = 190;
@@ -25,6 +25,7 @@ export class TopView {
   #things = svg("g");
   #map = svg("g");
   #tracks = svg("g");
+  #truth = svg("g");
   #hits = svg("g");
   #drones = svg("g");
   /** @type {Map<number, Drawn>} */
@@ -41,7 +42,7 @@ export class TopView {
     this.#words = words;
     this.#nameOf = nameOf;
     this.picture = svg("svg", { role: "img", class: "t-picture", "aria-label": words.label });
-    this.picture.append(this.#things, this.#map, this.#tracks, this.#hits, this.#drones);
+    this.picture.append(this.#things, this.#map, this.#tracks, this.#truth, this.#hits, this.#drones);
     parent.append(this.picture);
     this.setWorld(null);
   }
@@ -58,7 +59,7 @@ export class TopView {
     this.#things.replaceChildren(
       ...this.#ground(), ...this.#heights(),
       ...(scenario ? this.#contents(/** @type {Scenario} */ (scenario)) : []));
-    for (const group of [this.#map, this.#tracks, this.#hits, this.#drones]) group.replaceChildren();
+    for (const group of [this.#map, this.#tracks, this.#truth, this.#hits, this.#drones]) group.replaceChildren();
     this.#drawn.clear();
   }
 
@@ -91,6 +92,11 @@ export class TopView {
     }));
   }
 
+  /** Show where simulated drones truly were. @param {number[][][]} paths */
+  setTruth(paths) {
+    this.#truth.replaceChildren(...paths.map((places) => svg("polyline", { points: this.#points(places), class: "t-truth", stroke: TRUTH_COLOUR })));
+  }
+
   /** Mark where something was hit. @param {number[][]} places */
   setHits(places) {
     this.#hits.replaceChildren(...places.map(([x, y]) => svg("path", { d: `M ${this.#x(x)} ${this.#y(y)} m -6 -6 l 12 12 m 0 -12 l -12 12`, class: "t-hit" })));
@@ -105,18 +111,30 @@ export class TopView {
     const frames = (map?.frames ?? []).map(
       (gate) => this.#mappedFrame(gate, /** @type {Scenario|null} */ (scenario)));
     const path = map ? [svg("polyline", { points: this.#points(map.path), class: "t-path", stroke: PATH_COLOUR })] : [];
-    this.#map.replaceChildren(...frames, ...path);
+    const place = map?.place ? [this.#around(map.place, PLACE_COLOUR, { "data-place": "" })] : [];
+    this.#map.replaceChildren(...frames, ...place, ...path);
   }
 
   /** @param {import("./map.js").MappedFrame} gate @param {Scenario|null} scenario */
   #mappedFrame(gate, scenario) {
-    const [half] = halfSizeOf(gate, scenario), axes = halfAxesOf(gate), scale = this.#scale;
+    const [half] = halfSizeOf(gate, scenario), scale = this.#scale;
     const colour = colourOf(gate.colour);
     const outline = svg("g", { transform: `rotate(${(-gate.yaw * 180) / Math.PI})`, class: "t-mapped" },
       svg("rect", { x: -0.1 * scale, y: -half * scale, width: 0.2 * scale, height: 2 * half * scale, ...(gate.certain ? {} : { "stroke-dasharray": "4 3" }) }),
       svg("path", { d: `M ${-NORMAL_M * scale} 0 H ${NORMAL_M * scale}` }));
-    const around = axes ? [svg("ellipse", { rx: axes[0] * scale, ry: axes[1] * scale, fill: colour, "fill-opacity": 0.25 })] : [];
-    return svg("g", { transform: `translate(${this.#x(gate.p[0])} ${this.#y(gate.p[1])})`, stroke: colour, "data-mapped": gate.colour }, ...around, outline);
+    const group = this.#around(gate, colour, { stroke: colour, "data-mapped": gate.colour });
+    group.append(outline);
+    return group;
+  }
+
+  /**
+   * The ellipse of a place.
+   * @param {{p: number[], std: number[]|null}} place @param {string} colour @param {Record<string, string>} attributes
+   */
+  #around(place, colour, attributes) {
+    const axes = halfAxesOf(place), scale = this.#scale;
+    const ellipse = axes ? [svg("ellipse", { rx: axes[0] * scale, ry: axes[1] * scale, fill: colour, "fill-opacity": 0.25 })] : [];
+    return svg("g", { transform: `translate(${this.#x(place.p[0])} ${this.#y(place.p[1])})`, ...attributes }, ...ellipse);
   }
 
   /** @param {number} id @returns {Drawn} */
