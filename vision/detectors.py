@@ -37,7 +37,7 @@ class DetectorError(UserError):
 
 
 class SightingMaker:
-    """Makes `GateSighting`s of four corners each.
+    """Makes sightings (`GateSighting`) of four corners each.
 
     Args:
         calibration: of the camera.
