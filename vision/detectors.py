@@ -37,7 +37,7 @@ class DetectorError(UserError):
 
 
 class SightingMaker:
-    """Makes sightings (`GateSighting`) of four corners each.
+    """Makes a `GateSighting` of four corners.
 
     Args:
         calibration: of the camera.

@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from framerunner.geometry.vectors import ZERO3
 from offboard.navigation.camera_model import NEAREST_M
 from offboard.place.measurements import Eye
 from offboard.place.place_filter import POSE, Floats, PlaceFilter
@@ -32,8 +31,6 @@ ANYWHERE_STD_M = 30.0  # across that
 FARTHEST_M = 14.0  # of a point of the floor
 ROUNDS = 4
 GATE_SIGMA = 3.0
-LOST_SHARE, LOST_LEAST, LOST_IMAGES = 0.35, 4, 3  # too few of the points fit, of so many, in images in a row
-LOST_M_S = 0.5  # by which the velocity is known less well then
 FLOOR_WORSE = 6.0  # by which a point of the floor may fit worse than one anywhere, squares of deviations
 
 
@@ -89,7 +86,6 @@ class PointWindow:
         self._focal_px = focal_px
         self._images: dict[int, _Image] = {}  # by time, oldest first
         self._open: dict[int, list[int]] = {}  # times of the images that show a point and have not been used
-        self._lost = 0  # images in a row in which most points did not fit
 
     def see(self, place: PlaceFilter, tracks: PointTracks, first: Eye, middle: Eye, last: Eye) -> None:
         """Use an image, to whose time the filter was brought.
@@ -150,11 +146,6 @@ class PointWindow:
         fits = found.fit(covariance, 2.0 * shown.sum(axis=1) - 3.0)
         if fits.any():
             place.inform(index, found.information[fits].sum(axis=0), found.vector[fits].sum(axis=0))
-        if len(due) >= LOST_LEAST:
-            self._lost = self._lost + 1 if fits.sum() < LOST_SHARE * len(due) else 0
-        if self._lost >= LOST_IMAGES:
-            self._lost = 0
-            place.displace(place.time_us, ZERO3, 0.0, LOST_M_S)
 
 
 class _Cameras(NamedTuple):
