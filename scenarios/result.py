@@ -191,9 +191,8 @@ class _Flown(_Record):
 class FlightResult(RefereeReport, _Flown):
     """The result of a flight, as `result.json` has it.
 
-    A field that was never set is not written: errors of the place are set where the truth is known, its
-    standard deviation where the app has estimated the place; `state_sha256` in lockstep flights; `timing`,
-    and `lift_m` where frames were lifted, in real time; recordings have no wall times.
+    A field that was never set is not written: `state_sha256` is set in lockstep flights; `timing`, and
+    `lift_m` where frames were lifted, in real time; recordings have no wall times.
     """
 
     cause: Text = Field("", description="why the flight was not clean, or its mission broken off; else empty")
@@ -234,12 +233,18 @@ class FlightResult(RefereeReport, _Flown):
         description="how far from the true place that was by which the drone was flown (estimated by the app "
         "or, if it estimated none, reported by the vehicle), one for each of crossing_times_s",
     )
-    last_place_error_m: Metres = Field(0.0, description="likewise when the motors stopped")
-    largest_place_std_m: Metres = Field(
-        0.0, description="standard deviation of the place estimated by the app, of x, y or z, when largest"
+    last_place_error_m: Metres | None = Field(
+        None, description="likewise when the motors stopped; null if it is not known"
     )
-    largest_reported_error_m: Metres = Field(
-        0.0, description="how far from the true place the place was that the vehicle reported, at most"
+    largest_place_std_m: Metres | None = Field(
+        None,
+        description="standard deviation of the place estimated by the app, of x, y or z, when largest; null: "
+        "it estimated none",
+    )
+    largest_reported_error_m: Metres | None = Field(
+        None,
+        description="how far from the true place that was which the vehicle reported, at most; null if it "
+        "is not known",
     )
     state_sha256: str = Field(
         "", max_length=64, description="over the true state of every control tick of a lockstep flight"

@@ -161,19 +161,15 @@ def _bound(plan: FlightPlan, report: RefereeReport) -> dict[str, float | None]:
 
 def _place(track: Track, report: RefereeReport, largest_std_m: float | None) -> dict[str, Any]:
     """How exactly the drone's place was known, as far as that is known."""
-    deviation = {} if largest_std_m is None else {"largest_place_std_m": round(largest_std_m, 4)}
     flown_by = track.estimated_path or track.reported_path
-    if not track.true_path or not flown_by:
-        return deviation
-    last_s = min(flown_by[-1][0], report.try_time_s)
-    errors_m = [track.place_error_m(time_s) for time_s in (*report.crossing_times_s, last_s)]
-    *at_crossings_m, last_m = (round(hypot(*error_m), 4) for error_m in errors_m if error_m is not None)
+    times_s = (*report.crossing_times_s, min(flown_by[-1][0], report.try_time_s)) if flown_by else ()
+    errors_m = [round(hypot(*error_m), 4) for error_m in map(track.place_error_m, times_s) if error_m]
     most_m = track.largest_error_m(track.reported_path)
     return {
-        "place_errors_m": tuple(at_crossings_m),
-        "last_place_error_m": last_m,
-        **deviation,
-        **({} if most_m is None else {"largest_reported_error_m": round(most_m, 4)}),
+        "place_errors_m": tuple(errors_m[:-1]),
+        "last_place_error_m": errors_m[-1] if errors_m else None,
+        "largest_place_std_m": None if largest_std_m is None else round(largest_std_m, 4),
+        "largest_reported_error_m": None if most_m is None else round(most_m, 4),
     }
 
 
