@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from framerunner.geometry.base_marker import BaseMarkers
+from framerunner.geometry.marker_cells import white_parts
 from framerunner.geometry.solids import Solid
 from framerunner.geometry.vectors import Vec3
 from scenarios.models import Arena, Base, Light, Scenario, UprightGate
@@ -183,7 +184,7 @@ def _markers(box: Solid, markers: BaseMarkers, light: Light) -> list[Face]:
     found = []
     for marked in markers.faces(2 * half, 2 * half_height):
         parts = [((-sheet, sheet, -sheet, sheet), PAPER_BGR), ((-black, black, -black, black), INK_BGR)]
-        parts += [(part, PAPER_BGR) for part in markers.white_parts(marked.number)]
+        parts += [(part, PAPER_BGR) for part in white_parts(markers, marked.number)]
         for part, colour in parts:
             local = [(x, y, z - half_height) for x, y, z in marked.rectangle(*part)]
             found.append(box_face(box, local, marked.normal, colour, light))

@@ -175,7 +175,9 @@ class Detections:
     frames: tuple[GateSighting, ...] = ()  # by shape; only from the gate finder
     obstacle_edges: tuple[ObstacleEdge, ...] = ()  # from left to right; only from the gate finder
     base: Annotated[BaseSighting | None, Field(description="the base, where it is expected and seen")] = None
-    tracks: PointTracks | None = None  # only from a detector that follows points
+    tracks: Annotated[
+        PointTracks | None, Field(description="points that are followed from image to image")
+    ] = None
 
 
 @dataclass(frozen=True, slots=True)

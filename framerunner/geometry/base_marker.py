@@ -10,18 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-import cv2
-import numpy as np
-import numpy.typing as npt
-
 from framerunner.geometry.vectors import Vec3
 
 MarkerFamily = Literal["aruco_4x4", "apriltag_36h11"]
 
-_DICTIONARIES: dict[MarkerFamily, int] = {
-    "aruco_4x4": cv2.aruco.DICT_4X4_50,
-    "apriltag_36h11": cv2.aruco.DICT_APRILTAG_36h11,
-}
+_CELLS: dict[MarkerFamily, int] = {"aruco_4x4": 6, "apriltag_36h11": 8}  # of the black square's edge
+_COUNTS: dict[MarkerFamily, int] = {"aruco_4x4": 50, "apriltag_36h11": 587}
 _FACES: tuple[tuple[str, Vec3, Vec3], ...] = (  # name, normal, and where the marker's upper side is
     ("top", (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)),
     ("x side", (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
@@ -80,38 +74,17 @@ class BaseMarkers:
     @property
     def cells(self) -> int:
         """How many cells the black square is wide."""
-        return self.dictionary.markerSize + 2
+        return _CELLS[self.family]
 
     @property
     def count(self) -> int:
         """How many markers the family has."""
-        return len(self.dictionary.bytesList)
+        return _COUNTS[self.family]
 
     @property
     def sheet_m(self) -> float:
         """Edge of the white sheet, at least."""
         return self.edge_m * (1.0 + 2.0 / self.cells)
-
-    @property
-    def dictionary(self) -> cv2.aruco.Dictionary:
-        """OpenCV's, of the family."""
-        return cv2.aruco.getPredefinedDictionary(_DICTIONARIES[self.family])
-
-    def white_cells(self, number: int) -> npt.NDArray[np.bool_]:
-        """Which cells of a marker are white, rows from above, shape (cells, cells)."""
-        image = cv2.aruco.generateImageMarker(self.dictionary, number, self.cells)
-        return np.asarray(image) > 0
-
-    def white_parts(self, number: int) -> tuple[tuple[float, float, float, float], ...]:
-        """The same as rectangles: left, right, lower, upper, metres from the marker's centre."""
-        cell_m, half_m = self.edge_m / self.cells, self.edge_m / 2
-        parts = []
-        for row, cells in enumerate(self.white_cells(number)):
-            changes = np.flatnonzero(np.diff(np.concatenate(([False], cells, [False])))).tolist()
-            for begin, end in zip(changes[::2], changes[1::2], strict=True):
-                upper_m = half_m - row * cell_m
-                parts.append((begin * cell_m - half_m, end * cell_m - half_m, upper_m - cell_m, upper_m))
-        return tuple(parts)
 
     def faces(self, base_edge_m: float, base_top_m: float) -> tuple[MarkedFace, ...]:
         """The faces of a base of this size."""

@@ -14,6 +14,7 @@ from matplotlib.patches import Rectangle
 
 from framerunner.errors import SettingError, write_advice
 from framerunner.geometry.base_marker import BaseMarkers, MarkedFace
+from framerunner.geometry.marker_cells import white_parts
 from scenarios.models import Scenario
 
 _PAPER_MM = {"A4": (210, 297), "A3": (297, 420), "A2": (420, 594), "A1": (594, 841), "A0": (841, 1189)}
@@ -67,7 +68,7 @@ def _page(scenario: Scenario, markers: BaseMarkers, face: MarkedFace) -> Figure:
     axes.add_patch(Rectangle(cut_at, sheet_mm, sheet_mm, fill=False, edgecolor="0.6", linewidth=0.5))
     half_m = markers.edge_m / 2
     parts = [((-half_m, half_m, -half_m, half_m), "black")]
-    parts += [(part, "white") for part in markers.white_parts(face.number)]
+    parts += [(part, "white") for part in white_parts(markers, face.number)]
     for (left_m, right_m, lower_m, upper_m), colour in parts:
         corner = (x_mm + 1e3 * left_m, y_mm + 1e3 * lower_m)
         wide_mm, high_mm = 1e3 * (right_m - left_m), 1e3 * (upper_m - lower_m)

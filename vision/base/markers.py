@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from framerunner.geometry.base_marker import BaseMarkers
+from framerunner.geometry.marker_cells import marker_dictionary, white_cells
 from vision.base.model import Floats
 from vision.calibration.lens import Lens
 from vision.types import BaseExpectation, BaseSighting, Image
@@ -46,14 +47,14 @@ class MarkerReader:
         settings.adaptiveThreshWinSizeMin, settings.adaptiveThreshWinSizeMax = least, greatest
         settings.adaptiveThreshWinSizeStep = step
         settings.minMarkerPerimeterRate = _LEAST_PERIMETER
-        self._detector = cv2.aruco.ArucoDetector(markers.dictionary, settings)
+        self._detector = cv2.aruco.ArucoDetector(marker_dictionary(markers.family), settings)
         self._lens = lens
         half_m = markers.edge_m / 2
         self._corners_m: dict[int, Floats] = {}
         self._patterns: dict[int, npt.NDArray[np.float32]] = {}  # white 1, black 0, a white rim around
         for face in markers.faces(edge_m, top_m):
             self._corners_m[face.number] = np.array(face.rectangle(-half_m, half_m, -half_m, half_m))
-            cells = markers.white_cells(face.number).astype(np.float32)
+            cells = white_cells(markers, face.number).astype(np.float32)
             self._patterns[face.number] = np.pad(cells, 1, constant_values=1.0)
 
     def find(self, image: Image, expected: BaseExpectation) -> BaseSighting | None:

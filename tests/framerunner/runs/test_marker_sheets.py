@@ -8,6 +8,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from framerunner.cli import run
+from framerunner.geometry.marker_cells import marker_dictionary
 from framerunner.runs.marker_sheets import marker_sheets
 from scenarios.models import Base, BaseMarker, Scenario
 
@@ -17,7 +18,7 @@ PX_PER_MM = 4.0
 @pytest.mark.parametrize(("family", "edge_mm"), [("aruco_4x4", 140), ("apriltag_36h11", 300)])
 def test_pages_show_the_markers_true_to_size(family, edge_mm):
     marker = BaseMarker(family=family, first=3, edge_m=edge_mm / 1000)
-    detector = cv2.aruco.ArucoDetector(marker.markers.dictionary)
+    detector = cv2.aruco.ArucoDetector(marker_dictionary(marker.markers.family))
     numbers = []
     for page in marker_sheets(Scenario(name="marked", base=Base(marker=marker))):
         page.set_dpi(25.4 * PX_PER_MM)
