@@ -1,1 +1,0 @@
-"""How a vehicle follows commands: identified in flight."""
