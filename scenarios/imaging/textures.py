@@ -11,7 +11,7 @@ from scenarios.part import Part
 
 Pattern = Literal["wood", "concrete", "carpet", "brick"]
 PATTERNS: tuple[Pattern, ...] = ("wood", "concrete", "carpet", "brick")
-MAX_TEXTURE_SEED = 2**31 - 1
+MAX_TEXTURE_SEED = 10**9 - 1
 
 
 class Texture(Part):

@@ -96,18 +96,17 @@ def test_a_simulator_stopped_before_the_start_is_interrupted(tmp_path):
     assert "interrupted" in running.err
 
 
-@pytest.mark.parametrize("command", ["sim", "fly"])
-def test_a_program_started_in_the_background_of_a_script_can_be_ended(tmp_path, command):
+@pytest.mark.parametrize(("command", "ready"), [("sim", "Ready for takeoff!"), ("fly", "take_off")])
+def test_a_program_started_in_the_background_of_a_script_can_be_ended(tmp_path, command, ready):
     """There SIGINT is ignored from the start (POSIX shells do so), SIGTERM must still do."""
     instance = free_instance()
-    script = f'"{sys.executable}" -m framerunner {command} --instance {instance} & echo $!; wait'
+    script = f'"{sys.executable}" -m framerunner {command} --instance {instance} 2>said & echo $!; wait'
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     with subprocess.Popen(
-        ["sh", "-c", script], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, cwd=tmp_path, env=environment
+        ["sh", "-c", script], stdout=subprocess.PIPE, cwd=tmp_path, env=environment
     ) as shell:
-        pid = int(shell.stdout.readline())
-        assert wait_until(lambda: not ports_are_free(instance), 20.0)
-        time.sleep(2.0)
+        pid, said = int(shell.stdout.readline()), tmp_path / "said"
+        assert wait_until(lambda: ready in said.read_text(encoding="utf-8"), 20.0), said.read_text()
         os.kill(pid, signal.SIGTERM)
         assert wait_until(lambda: not is_running(pid), 10.0)
     assert ports_are_free(instance)

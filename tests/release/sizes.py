@@ -51,7 +51,7 @@ EXTRAS = {  # what each adds
     "postgresql": "contests stored in PostgreSQL",
     "ray": "`evaluate --backend ray`",
 }
-NOT_FOR_USERS = frozenset({"dev", "docs"})
+NOT_FOR_USERS = frozenset({"dev", "docs", "reference"})
 
 
 class Environment:

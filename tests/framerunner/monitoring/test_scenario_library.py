@@ -18,14 +18,14 @@ def test_own_files_are_found_by_the_name_in_them(tmp_path):
     library = ScenarioLibrary([folder, file, tmp_path / "absent"])
     assert library.names() == list_scenarios()
     folder.mkdir()
-    own = write(folder / "a file.yaml", "hall-3")
+    own = write(folder / "a file.yaml", "school-3")
     (folder / "broken.yaml").write_text("name: [", encoding="utf-8")
     write(file, "single")
-    assert library.names() == ["hall-3", "single", *list_scenarios()]
-    assert library.load("hall-3") == own
-    assert library.argument("hall-3") == str(folder / "a file.yaml")
+    assert library.names() == ["school-3", "single", *list_scenarios()]
+    assert library.load("school-3") == own
+    assert library.argument("school-3") == str(folder / "a file.yaml")
     assert (library.argument("calm-3"), library.load("calm-3")) == ("calm-3", load_scenario("calm-3"))
-    write(folder / "a file.yaml", "hall-44")
-    with pytest.raises(ScenarioError, match="hall-3"):
-        library.load("hall-3")
-    assert library.load("hall-44").name == "hall-44"
+    write(folder / "a file.yaml", "school-44")
+    with pytest.raises(ScenarioError, match="school-3"):
+        library.load("school-3")
+    assert library.load("school-44").name == "school-44"
