@@ -102,10 +102,12 @@ def test_a_program_started_in_the_background_of_a_script_can_be_ended(tmp_path, 
     instance = free_instance()
     script = f'"{sys.executable}" -m framerunner {command} --instance {instance} 2>said & echo $!; wait'
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    said = tmp_path / "said"
+    said.touch()  # the script opens it in the background, perhaps after its first line
     with subprocess.Popen(
         ["sh", "-c", script], stdout=subprocess.PIPE, cwd=tmp_path, env=environment
     ) as shell:
-        pid, said = int(shell.stdout.readline()), tmp_path / "said"
+        pid = int(shell.stdout.readline())
         assert wait_until(lambda: ready in said.read_text(encoding="utf-8"), 20.0), said.read_text()
         os.kill(pid, signal.SIGTERM)
         assert wait_until(lambda: not is_running(pid), 10.0)
