@@ -96,7 +96,7 @@ def test_a_simulator_stopped_before_the_start_is_interrupted(tmp_path):
     assert "interrupted" in running.err
 
 
-@pytest.mark.parametrize(("command", "ready"), [("sim", "Ready for takeoff!"), ("fly", "take_off")])
+@pytest.mark.parametrize(("command", "ready"), [("sim", "Ready for takeoff!"), ("fly", "red.")])
 def test_a_program_started_in_the_background_of_a_script_can_be_ended(tmp_path, command, ready):
     """There SIGINT is ignored from the start (POSIX shells do so), SIGTERM must still do."""
     instance = free_instance()
