@@ -69,13 +69,15 @@ class LabelSession:
         head: what holds for all pictures.
 
     Raises:
-        SettingError: there are no pictures in the folder, or its labels.json cannot be used; or it has none,
+        SettingError: it is no folder, or has no pictures, or its labels.json cannot be used; or it has none,
             and `new` is None.
     """
 
     def __init__(self, folder: Path, new: Head | None) -> None:
+        if not folder.is_dir():
+            raise SettingError(f"{folder}: is no folder; give one with pictures")
         self._folder = folder
-        names = [] if not folder.is_dir() else [path.name for path in sorted(folder.iterdir())]
+        names = [path.name for path in sorted(folder.iterdir())]
         self._labelled: dict[str, LabelledPicture] = {}
         if (folder / FILE).exists():
             own = OwnPictures.of_folder(folder)
