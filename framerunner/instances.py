@@ -55,11 +55,11 @@ def _is_free(instance: int) -> bool:
         return False
     try:
         for port in _TCP_PORTS:
-            listen_tcp(("127.0.0.1", port + instance)).close()
+            listen_tcp(("127.0.0.1", port + instance), patience_s=0.0).close()
         shift = ardupilot.PORTS_AN_INSTANCE * instance
         shifted = [port + shift for port in _ARDUPILOT_UDP_PORTS]
         for port in (*(port + instance for port in _UDP_PORTS), *shifted):
-            bind_udp(("127.0.0.1", port), "").close()
+            bind_udp(("127.0.0.1", port), "", patience_s=0.0).close()
     except LinkError:
         return False
     return True

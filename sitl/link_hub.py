@@ -93,7 +93,7 @@ class LinkHub:
         if is_loopback(remote[0]):
             # Everywhere, where MAVSDK binds: a more specific address would receive before it.
             with suppress(LinkError):
-                listener = bind_udp(("0.0.0.0", remote[1]), "", gives_way=True)
+                listener = bind_udp(("0.0.0.0", remote[1]), "", gives_way=True, patience_s=0.0)
                 links.append(UdpLink(listener, None, receive, accepts=accepts))
         self._add(profile, links)
 

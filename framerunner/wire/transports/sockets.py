@@ -12,20 +12,23 @@ from __future__ import annotations
 import errno
 import os
 import socket
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import cast
+from typing import TypeVar, cast
 
 from serial import Serial
 
 from framerunner.wire.transports.urls import LinkError, LinkUrl, in_url
 
 Address = tuple[str, int]
+_Opened = TypeVar("_Opened")
 
 MAX_UNSENT_BYTES = 1 << 18  # of a stream; a slower reader loses packets
 MAX_DATAGRAMS_AT_ONCE = 200  # so that a flood does not keep the reader from all else
 _CONNECT_S = 5.0
+_PROBE_S = 0.5  # another program that only looks whether a port is free has it for less
 _READ_BYTES = 1 << 16
 
 
@@ -174,7 +177,9 @@ class OneClient:
         self._listener.close()
 
 
-def bind_udp(place: Address, advice: str, *, gives_way: bool = False) -> UdpSocket:
+def bind_udp(
+    place: Address, advice: str, *, gives_way: bool = False, patience_s: float = _PROBE_S
+) -> UdpSocket:
     """A UDP socket that listens.
 
     Args:
@@ -182,12 +187,13 @@ def bind_udp(place: Address, advice: str, *, gives_way: bool = False) -> UdpSock
         advice: what to do when the port is taken.
         gives_way: whether a program that binds the same address later, as MAVSDK does (SO_REUSEADDR),
             receives instead of this one.
+        patience_s: for how long a port that is in use is tried again.
     """
     with _explained(f"UDP {in_url(*place)} cannot be opened", advice):
         family, address = _local(place, socket.SOCK_DGRAM)
         opened = socket.socket(family, socket.SOCK_DGRAM)
         try:
-            opened.bind(address)
+            _patiently(lambda: opened.bind(address), patience_s)
         except OSError:
             opened.close()
             raise
@@ -216,16 +222,19 @@ def resolved_ipv4(place: Address, what: str = "UDP") -> Address:
     return cast(Address, found[0][4])
 
 
-def listen_tcp(place: Address, advice: str = "choose another port") -> socket.socket:
+def listen_tcp(
+    place: Address, advice: str = "choose another port", *, patience_s: float = _PROBE_S
+) -> socket.socket:
     """A socket that takes TCP connections and does not block.
 
     Args:
         place: the local address.
         advice: what to do when the port is taken.
+        patience_s: for how long a port that is in use is tried again.
     """
     with _explained(f"TCP {in_url(*place)} cannot be listened on", advice):
         family, address = _local(place, socket.SOCK_STREAM)
-        listener = socket.create_server(address, family=family)
+        listener = _patiently(lambda: socket.create_server(address, family=family), patience_s)
     listener.setblocking(False)
     return listener
 
@@ -280,6 +289,18 @@ def check_free(url: LinkUrl, advice: str) -> None:
 
 def _advice(url: LinkUrl, otherwise: str) -> str:
     return f"is another flight or ground station on UDP port {url.number}? Close it or {otherwise}"
+
+
+def _patiently(opens: Callable[[], _Opened], patience_s: float) -> _Opened:
+    """Call what opens a port until it is not in use; programs try by binding whether one is free."""
+    end_s = time.monotonic() + patience_s
+    while True:
+        try:
+            return opens()
+        except OSError as error:
+            if error.errno != errno.EADDRINUSE or time.monotonic() >= end_s:
+                raise
+        time.sleep(0.02)
 
 
 def _local(place: Address, kind: socket.SocketKind) -> tuple[socket.AddressFamily, Address]:

@@ -1,5 +1,8 @@
 """URLs of links, and sockets that never block."""
 
+import socket
+import threading
+
 import pytest
 
 from framerunner.wire.transports.sockets import (
@@ -22,6 +25,7 @@ from framerunner.wire.transports.urls import (
     is_loopback,
     parse_url,
 )
+from tests.processes import bound
 
 
 @pytest.mark.parametrize(
@@ -149,6 +153,18 @@ def test_one_client_after_the_other():
     assert (server.read(), server.read(), server.read()) == (None, None, b"b")
     second.close()
     server.close()
+
+
+@pytest.mark.parametrize("kind", [socket.SOCK_DGRAM, socket.SOCK_STREAM])
+def test_a_port_that_another_program_only_tries_is_opened_a_moment_later(kind):
+    """Programs find a free instance by binding its ports, while a simulator may be about to open them."""
+    with bound(0, kind) as trying:
+        place = trying.getsockname()
+        opens = bind_udp if kind == socket.SOCK_DGRAM else listen_tcp
+        with pytest.raises(LinkError, match="in use"):
+            opens(place, "", patience_s=0.0)
+        threading.Timer(0.1, trying.close).start()
+        opens(place, "", patience_s=10.0).close()
 
 
 def test_of_a_flood_of_datagrams_so_many_are_read_at_once():
