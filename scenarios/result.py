@@ -246,6 +246,11 @@ class FlightResult(RefereeReport, _Flown):
         description="how far from the true place that was which the vehicle reported, at most; null if it "
         "is not known",
     )
+    false_gates: Count | None = Field(
+        None,
+        description="places at which the app's map had a certain gate, farther than 1 m from every frame of "
+        "its colour; null if the mission has no map",
+    )
     state_sha256: str = Field(
         "", max_length=64, description="over the true state of every control tick of a lockstep flight"
     )
@@ -335,6 +340,7 @@ _OPTIONAL = (
     "last_place_error_m",
     "largest_place_std_m",
     "largest_reported_error_m",
+    "false_gates",
     "state_sha256",
     "lift_m",
     "timing",

@@ -70,6 +70,8 @@ class Summary:
         causes: of flights that were not clean, failures first, then most frequent first.
         faults_as_expected: of flights with a fault that the fault table has, those that ended as it says;
             None if there were none.
+        with_false_gates: of flights with a map, those on whose map a certain gate was none; None if no
+            flight had a map.
     """
 
     flights: int
@@ -83,6 +85,7 @@ class Summary:
     seconds_in_state: dict[str, float]
     causes: tuple[FailureCause, ...]
     faults_as_expected: Rate | None = None
+    with_false_gates: Rate | None = None
 
 
 def wilson(count: int, total: int) -> Rate:
@@ -126,7 +129,14 @@ def summarise(rows: Sequence[EvaluationRow]) -> Summary:
         seconds_in_state=mean_seconds_in_state(flown),
         causes=causes(rows),
         faults_as_expected=_faults_as_expected(flown),
+        with_false_gates=_with_false_gates(flown),
     )
+
+
+def _with_false_gates(rows: Sequence[EvaluationRow]) -> Rate | None:
+    """Of the flights with a map, those with a false gate on it; None if there were none."""
+    counts = [row.false_gates for row in rows if row.false_gates is not None]
+    return wilson(sum(count > 0 for count in counts), len(counts)) if counts else None
 
 
 def _faults_as_expected(rows: Sequence[EvaluationRow]) -> Rate | None:

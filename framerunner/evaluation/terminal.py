@@ -69,6 +69,8 @@ def print_summary(summary: Summary, title: str) -> None:
     rates.add_row("landed in time", str(summary.landed.count), str(summary.landed), style="bold")
     if summary.penalised.count:
         rates.add_row("was outside", str(summary.penalised.count), str(summary.penalised))
+    if (false := summary.with_false_gates) is not None:
+        rates.add_row("a false gate on the map", str(false.count), str(false))
     if (faults := summary.faults_as_expected) is not None:
         rates.add_row("ended as the fault table says", str(faults.count), str(faults), style="bold")
     console.print(rates)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import degrees, dist, hypot, pi, remainder
 
 from framerunner.runs.track import Track
 from offboard.app import MissionEnd, Moment
-from offboard.navigation.view import NavigationView
+from offboard.navigation.view import GateEstimate, NavigationView
 from offboard.safety.operator import STOPPED
 from scenarios.crossing import Boundary
 from scenarios.models import COLOURS, Gate, Scenario
@@ -69,6 +70,26 @@ class CauseWatch:
             parts.append(self._hindrance(flown))
         return "; ".join(part for part in parts if part)
 
+    def false_gates(self, flown: Flown) -> int | None:
+        """How many places the map had a certain gate at that is none of the layout; None without a map.
+
+        A place is farther than `SAME_GATE_M` from each gate of its colour, as estimated and also after what
+        the drone's place was off by has been subtracted. Places of a colour nearer to each other are one.
+        """
+        if not self._views:
+            return None
+        found: list[GateEstimate] = []
+        for time_us, view in self._views:
+            for estimate in view.gates:
+                if estimate.certain and not _is_at(estimate, estimate.position_m, found):
+                    time_s = (time_us - (flown.began_us or 0)) / 1e6
+                    error_m = flown.track.place_error_m(time_s) or (0.0, 0.0, 0.0)
+                    corrected = [at - error for at, error in zip(estimate.position_m, error_m, strict=True)]
+                    places = (estimate.position_m, corrected)
+                    if not any(_is_at(estimate, place, flown.layout.frames) for place in places):
+                        found.append(estimate)
+        return len(found)
+
     def _contact(self, flown: Flown) -> str:
         """The first contact, and how exact the map was then."""
         report = flown.report
@@ -128,6 +149,18 @@ class CauseWatch:
         if not any(seen.colour == colour for _, view in self._views for seen in view.gates):
             return f"{colour} was never on the map"
         return words
+
+
+def _is_at(
+    estimate: GateEstimate, place_m: Sequence[float], gates: Sequence[GateEstimate] | Sequence[Gate]
+) -> bool:
+    """Whether a place, in the arena's axes, is that of one of the gates of an estimate's colour."""
+    own = (gate for gate in gates if gate.colour == estimate.colour)
+    return any(dist(_position_m(gate), place_m) <= SAME_GATE_M for gate in own)
+
+
+def _position_m(gate: GateEstimate | Gate) -> Sequence[float]:
+    return gate.position_arena_m if isinstance(gate, Gate) else gate.position_m
 
 
 def lost_in(result: FlightResult, track: Track) -> str:

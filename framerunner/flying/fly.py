@@ -99,8 +99,9 @@ async def fly(
         began_us := None if standing is None else standing.began_us, true_path=judge.flown_path()
     )
     more = {**fault_fields(await judge.faults(), report, plan.scenario.sensors), **measured()}
-    cause = causes.words(Flown(plan.layout, report, outcome, track, began_us))
-    more |= {"cause": cause, "judged_by": judge.source, **_bound(plan, report)}
+    flown = Flown(plan.layout, report, outcome, track, began_us)
+    more |= {"cause": causes.words(flown), "false_gates": causes.false_gates(flown)}
+    more |= {"judged_by": judge.source, **_bound(plan, report)}
     more |= _place(track, report, recorder.largest_std_m)
     return FinishedFlight(_result(plan, report, outcome, track, measured=more), outcome, track, plan.layout)
 
