@@ -225,6 +225,7 @@ class Navigator:
                 self._flight.leave()
                 return self._flight.follow(state)
             return command
+        self._flight.arena = self._world.arena_with(gate)
         command = self._fly(gate, *self._goals_after(colour))
         path = self._flight.path
         finds_way = path is not None or self._flight.looks
@@ -254,6 +255,7 @@ class Navigator:
         if gap or action != self._action:
             self._action, self._goal = action, None
             self._way_home.begin()
+            self._flight.arena = self._world.arena
             self._flight.change()
         self._acted_s = now_s
         return state, now_s
