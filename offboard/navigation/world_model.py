@@ -115,6 +115,12 @@ class WorldModel:
         known = self._map.best(colour)
         return known if known is None else self._in_flight.get(colour, known)
 
+    def forget(self, colour: str) -> None:
+        """Begin anew with the gate of a colour, on the map and as a landmark."""
+        self._map.forget(colour)
+        self.localization.forget(colour)
+        self._gates = None
+
     @property
     def gates(self) -> tuple[GateEstimate, ...]:
         """All gates on the map, in the arena."""

@@ -148,6 +148,11 @@ class GateLandmarks:
         if self._elsewhere[colour] >= CONTRADICTIONS:
             self._drop(place, colour)
 
+    def forget(self, place: PlaceFilter, colour: str) -> None:
+        """Drop a gate, if it is in the filter."""
+        if colour in place.gates:
+            self._drop(place, colour)
+
     def _drop(self, place: PlaceFilter, colour: str) -> None:
         """Forget a gate that was none, or is elsewhere; one that was believed has moved the drone."""
         place.drop_gate(colour)

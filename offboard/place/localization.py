@@ -150,6 +150,10 @@ class Localization:
         std = self._place.std
         return 0.0 if std is None else float(std[:2].max())
 
+    def forget(self, colour: str) -> None:
+        """Drop a gate from the filter."""
+        self._place.forget(colour)
+
     def doubt(self) -> None:
         """See `PlaceEstimator.doubt`."""
         self._place.doubt()

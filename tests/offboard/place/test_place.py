@@ -340,3 +340,12 @@ def test_a_gate_by_the_arena_s_side_has_room_if_the_place_may_be_off_by_what_lac
         assert (wider_m >= 0.2) == is_wider
         assert wider_m <= (3.0 * std_m(states[-1]) if is_wider else 0.0)
         assert world.arena_with(PathGate((3.0, 1.0, 1.2), 0.3)) == told
+
+
+def test_a_gate_that_is_forgotten_begins_anew_on_the_map_and_as_a_landmark():
+    _, world = fly(Vehicle(6), 12.0)
+    assert world.gate("red") is not None
+    assert "red" in world.localization.finish(12_000_000)
+    world.forget("red")
+    assert world.gate("red") is None
+    assert "red" not in world.localization.finish(12_000_000)
