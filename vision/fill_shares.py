@@ -85,7 +85,7 @@ def has_coloured_lines(image: Image, known: Sequence[Box]) -> bool:
 
 def brightness_of_gates(image: Image) -> float:
     """How bright the channels of a gate's colour are in the light of an image, 0..255."""
-    brightness = np.percentile(image[::_GRID, ::_GRID].max(axis=2), _BRIGHT_PERCENT)
+    brightness = np.percentile(np.maximum.reduce(cv2.split(image[::_GRID, ::_GRID])), _BRIGHT_PERCENT)
     return max(_LEAST_BRIGHT, _BRIGHT * float(brightness))
 
 

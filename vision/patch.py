@@ -105,15 +105,16 @@ class ImagePatch:
         if self.lens is not None:
             places = self.lens.all_seen(places)
         rows, columns = self.labels.shape
-        at = np.rint(places + self.origin).astype(np.intp)
-        column, row = at[..., 0], at[..., 1]
-        known = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+        at = np.rint(places + self.origin)
+        known = ((at >= 0.0) & (at < (columns, rows))).all(axis=-1)
+        at[~known] = 0.0  # a place that a lens does not show is not a number
+        column, row = np.moveaxis(at.astype(np.intp), -1, 0)
         # A thin bar may be a pixel beside its axis.
         beside_rows = np.minimum(np.maximum(row + _BESIDE_ROWS, 0), rows - 1)
         beside_columns = np.minimum(np.maximum(column + _BESIDE_COLUMNS, 0), columns - 1)
         around = self.labels[beside_rows, beside_columns]
         own = known & (around & OWN).any(axis=0)
-        hidden = (np.abs(places) > self.reach_px).any(axis=-1) | (known & (around > OWN).any(axis=0))
+        hidden = ~(np.abs(places) <= self.reach_px).all(axis=-1) | (known & (around > OWN).any(axis=0))
         empty = ~(own | hidden)
         return Support(own.mean(axis=1).tolist(), empty.mean(axis=1).tolist())
 

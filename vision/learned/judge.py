@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vision.learned.crops import AROUND, FAR_AROUND, GRID_COLUMNS, GRID_ROWS, Box, box_around, cut_out
-from vision.learned.proposals import GateProposals, read_network
+from vision.learned.proposals import GateProposals, read_network, run_network
 from vision.types import Image
 
 Floats = npt.NDArray[np.float64]
@@ -62,8 +62,8 @@ def judge(image: Image, outlines: Outlines, around: float = AROUND) -> tuple[Flo
         return np.zeros(0), outlines
     boxes = [box_around(outline, around) for outline in outlines]
     network = _network()
-    network.setInput(cv2.dnn.blobFromImages([cut_out(image, box) for box in boxes], 1.0 / 255.0))
-    numbers = network.forward().astype(np.float64)
+    # One after the other: for another number of crops OpenCV would plan its memory anew.
+    numbers = np.array([run_network(network, cut_out(image, box))[0] for box in boxes], np.float64)
     chances: Floats = 1.0 / (1.0 + np.exp(-numbers[:, 0]))
     return chances, _corners(numbers[:, 1:].reshape(-1, 4, GRID_ROWS * GRID_COLUMNS), boxes)
 
