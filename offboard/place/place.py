@@ -303,7 +303,7 @@ class PlaceEstimator:
         for sighting, pose in zip(sightings, poses, strict=True):
             view = view_of(sighting, self._shapes.of(sighting.colour), self._camera, pose)
             if view is not None:
-                by_colour.setdefault(sighting.colour, []).append((view, self._eye(pose, at)))
+                by_colour.setdefault(sighting.colour, []).append((view, _eye(self._camera, pose, at)))
         self._landmarks.see(place, by_colour, gates)
 
     def see_tracks(self, tracks: PointTracks, rows: Sequence[DronePose], at: PoseCorrection) -> None:
@@ -315,7 +315,7 @@ class PlaceEstimator:
             at: the correction of these poses.
         """
         if self._filter is not None and self._points is not None:
-            eyes = [self._eye(pose, at) for pose in rows]
+            eyes = [_eye(self._camera, pose, at) for pose in rows]
             self._points.see(self._filter, tracks, *eyes)
 
     def see_points(
@@ -333,7 +333,9 @@ class PlaceEstimator:
         if place is None:
             return False
         covariance = POINTS_STD_FACTOR**2 * sighting.covariance_px2
-        model = points(points_m, sighting.pixels, covariance, self._eye(pose, at), pose.attitude_std_rad)
+        model = points(
+            points_m, sighting.pixels, covariance, _eye(self._camera, pose, at), pose.attitude_std_rad
+        )
         if place.update(model, POINTS_GATE):
             self._misfits = 0
             return True
@@ -358,15 +360,6 @@ class PlaceEstimator:
         """Standard deviations of x, y, z (metres) and the heading (radians); None if nothing is estimated."""
         return None if self._filter is None else np.sqrt(self._filter.p.diagonal()[:4])
 
-    def _eye(self, pose: DronePose, at: PoseCorrection) -> Eye:
-        """The carrier of a corrected pose, without the correction."""
-        x, y, z = (a - b for a, b in zip(pose.position_m, at.position_m, strict=True))
-        return Eye(
-            self._camera,
-            turned_by(-at.turn_rad, pose.attitude_arena),
-            (*turned(x, y, -at.turn_rad), z),
-        )
-
     def known(self, estimate: GateEstimate) -> GateEstimate:
         """A gate of the map, the best of its colour, as the filter has it: exact relative to the drone.
 
@@ -378,6 +371,12 @@ class PlaceEstimator:
         if estimate.colour not in place.gates:
             return replace(estimate, certain=False) if last.imu else estimate
         return self._landmarks.known(place, estimate)
+
+
+def _eye(camera: CameraModel, pose: DronePose, at: PoseCorrection) -> Eye:
+    """The carrier of a corrected pose, without the correction."""
+    x, y, z = (a - b for a, b in zip(pose.position_m, at.position_m, strict=True))
+    return Eye(camera, turned_by(-at.turn_rad, pose.attitude_arena), (*turned(x, y, -at.turn_rad), z))
 
 
 def _resets(state: DroneState) -> int:
