@@ -31,6 +31,7 @@ AHEAD_STD_M = 0.3  # of a next gate; if it is known less well, it is not planned
 SPACED_S = 0.15  # in which one image is enough: one from nearly the same place adds little to the map
 SPACED_M_S = 1.5  # up to this speed
 NEAR_GATE_M = 1.5  # nearer to a gate to be crossed that is not certain yet, no image is left out
+ANEW_REFUSALS = 3  # of a gate; then what was seen of it did not help, and it begins anew
 VIEWPOINT_WORK = 85_000  # of choosing where to look next, in the unit of `PathFlight.work`
 SEARCH_AFTER_M = 2.0  # from behind a gate to the drone, when it is chosen where to look from there
 
@@ -60,6 +61,7 @@ class Navigator:
         self._chosen_s = 0.0
         self._crossing: CrossingAttempt | None = None
         self._steps_back = 0
+        self._refusals: dict[str, int] = {}  # by colour
         self._alone = surroundings.alone
         self._added_m_s: Vec3 = (0.0, 0.0, 0.0)  # to the command at the last tick
 
@@ -176,7 +178,7 @@ class Navigator:
         return self._compensated(self._fly(goal))
 
     def step_back(self, colour: str) -> VelocityFluCommand:
-        """Fly back from a gate, to one of its sides, facing it."""
+        """Fly back from a gate, to one of its sides, facing it; one that was refused often begins anew."""
         state, _ = self._begin(f"step back from {colour}")
         self._world.localization.stay_by(colour)
         if self._goal is None:
@@ -187,6 +189,9 @@ class Navigator:
                 side = 1 if self._steps_back % 2 else -1
                 self._goal = self._places.aside(gate, here_m, side, self._world.obstacles())
             self._steps_back += 1
+            self._refusals[colour] = self._refusals.get(colour, 0) + 1
+            if self._refusals[colour] % ANEW_REFUSALS == 0:
+                self._world.forget(colour)
         return self._compensated(self._fly(self._goal))
 
     def cross(self, colour: str) -> VelocityFluCommand:
@@ -225,6 +230,7 @@ class Navigator:
                 self._flight.leave()
                 return self._flight.follow(state)
             return command
+        self._flight.arena = self._world.arena_with(gate)
         command = self._fly(gate, *self._goals_after(colour))
         path = self._flight.path
         finds_way = path is not None or self._flight.looks
@@ -254,6 +260,7 @@ class Navigator:
         if gap or action != self._action:
             self._action, self._goal = action, None
             self._way_home.begin()
+            self._flight.arena = self._world.arena
             self._flight.change()
         self._acted_s = now_s
         return state, now_s

@@ -61,6 +61,7 @@ class PathFlight:
         search: the one for a path that goes on at the next tick; None if none does.
         work: done at the last tick, in the unit of `LegFinder`.
         spent: of the next tick's work, on something else.
+        arena: paths stay in it.
     """
 
     def __init__(self, arena: Arena, style: FlightStyle, limits: CommandLimits) -> None:
@@ -70,7 +71,7 @@ class PathFlight:
         self.search: Search | None = None
         self.work = self.spent = 0
         load_graphs()
-        self._arena = arena
+        self.arena = arena
         self._style = self._usual_style = style
         self._follower = PathFollower(limits=limits)
         self._left: Path | None = None  # which the drone stops on
@@ -262,7 +263,7 @@ class PathFlight:
         """Begin to search for a path from the motion now."""
         self._stuck.planned(state.time_us * 1e-6)
         start, _ = self._start(state)
-        arena, style = self._arena, self._style
+        arena, style = self.arena, self._style
         search = Search(start, goals, obstacles=obstacles, arena=arena, style=style, previous=self.path)
         self._go_on(search, state, begun=True)
 
@@ -352,7 +353,7 @@ class PathFlight:
             )
         ]
         places_m = self._ahead(AHEAD_S + CHECK_S)
-        return obstructed(places_m, gates, obstacles=obstacles, arena=self._arena, style=self._style)
+        return obstructed(places_m, gates, obstacles=obstacles, arena=self.arena, style=self._style)
 
 
 def _own_motion(state: DroneState, coming: Prediction | None) -> Motion:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Container, Sequence
-from math import hypot
+from math import cos, hypot, sin
 
 from framerunner.geometry.axes import Pose
 from framerunner.geometry.vectors import Vec3
@@ -14,15 +14,18 @@ from offboard.navigation.exploration import Explorer, Pace
 from offboard.navigation.gates.gate_map import GateMap
 from offboard.navigation.goals import FlightStyle, Obstacles, PathGate
 from offboard.navigation.obstacle_map import ObstacleMap
-from offboard.navigation.planner.clearance import DRONE_RADIUS_M
+from offboard.navigation.planner.clearance import DRONE_RADIUS_M, deeper_m
+from offboard.navigation.planner.route import LEAST_STRAIGHT_M
 from offboard.navigation.search.likelihood import Glimpses
 from offboard.navigation.seen_space import SeenSpace, ViewedSpace
 from offboard.navigation.view import GateEstimate, Surroundings
 from offboard.place.localization import ImagePose, Localization
-from scenarios.models import COLOURS
+from scenarios.models import COLOURS, Arena
 from vision.types import Detections
 
 START_SPARE_M = 0.02  # by which what is known to be free at the start exceeds what the drone needs
+SIDES_SPARE_M = 0.1  # beside the least room that a path through a gate needs
+SIDES_STD = 3.0  # of the place, by which the arena's sides may be farther away than they seem
 IMAGES_WAITING = 32  # for the drone's pose when they were exposed
 
 
@@ -37,7 +40,7 @@ class WorldModel:
 
     def __init__(self, surroundings: Surroundings, style: FlightStyle) -> None:
         camera = self._camera = CameraModel.of(surroundings.camera)
-        self._surroundings = surroundings
+        self._surroundings, self._style = surroundings, style
         self.localization = Localization(surroundings)
         self._map = GateMap(camera, surroundings.arena, surroundings.shapes)
         self._obstacle_map = ObstacleMap(camera, surroundings.arena)
@@ -112,6 +115,12 @@ class WorldModel:
         known = self._map.best(colour)
         return known if known is None else self._in_flight.get(colour, known)
 
+    def forget(self, colour: str) -> None:
+        """Begin anew with the gate of a colour, on the map and as a landmark."""
+        self._map.forget(colour)
+        self.localization.forget(colour)
+        self._gates = None
+
     @property
     def gates(self) -> tuple[GateEstimate, ...]:
         """All gates on the map, in the arena."""
@@ -132,6 +141,34 @@ class WorldModel:
             min(max(z, half_m), arena.height_m - half_m),
         )
         return PathGate(inside, gate.yaw_rad, gate.shape)
+
+    @property
+    def arena(self) -> Arena:
+        """The arena, as it is told."""
+        return self._surroundings.arena
+
+    def arena_with(self, gate: PathGate) -> Arena:
+        """The arena in which a gate is crossed.
+
+        A gate has room before and behind its opening. If it seems to have none, the drone's place is wrong,
+        and the sides are farther away by that.
+        """
+        arena, std_m = self._surroundings.arena, self.localization.plan_std_m
+        if std_m == 0.0:
+            return arena
+        (x, y, _), yaw = gate.centre_m, gate.yaw_rad
+        room_m = LEAST_STRAIGHT_M + deeper_m(gate.shape)
+        over_m = max(
+            abs(x) + room_m * abs(cos(yaw)) - arena.length_x_m / 2,
+            abs(y) + room_m * abs(sin(yaw)) - arena.width_y_m / 2,
+        )
+        wider_m = min(
+            over_m + self._style.side_margin_m + SIDES_SPARE_M, SIDES_STD * std_m, arena.margin_m / 2
+        )
+        if wider_m <= 0.0:
+            return arena
+        sides_m = {"length_x_m": arena.length_x_m + 2 * wider_m, "width_y_m": arena.width_y_m + 2 * wider_m}
+        return arena.model_copy(update=sides_m)
 
     def obstacles(self) -> Obstacles:
         """All that a path must keep clear of; of each colour of the task only the gate known best."""

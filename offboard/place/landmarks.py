@@ -31,7 +31,7 @@ GATE_FACTOR = (
 # likelier by the ratio of the densities of size zero after and before (J. M. Dickey, "The weighted likelihood
 # ratio", Annals of Mathematical Statistics 42, 1971).
 SIZE_STD = 0.5  # of the logarithm of a thing's size that is no gate
-GATE_SIZE_STD = 0.001
+GATE_SIZE_STD = 0.00001  # times the metres since it was first seen, its place is known no better
 IS_GATE, IS_NONE = 5.0, 0.05  # ratios
 DROPPED_M, DROPPED_RAD = (0.2, 0.2, 0.05), radians(2.0)  # by which the place is less well known without it
 CONTRADICTIONS = 6  # in a row; then the gate is dropped
@@ -146,6 +146,11 @@ class GateLandmarks:
         )
         self._elsewhere[colour] = self._elsewhere.get(colour, 0) + 1 if away else 0
         if self._elsewhere[colour] >= CONTRADICTIONS:
+            self._drop(place, colour)
+
+    def forget(self, place: PlaceFilter, colour: str) -> None:
+        """Drop a gate, if it is in the filter."""
+        if colour in place.gates:
             self._drop(place, colour)
 
     def _drop(self, place: PlaceFilter, colour: str) -> None:

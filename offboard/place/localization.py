@@ -141,8 +141,18 @@ class Localization:
 
         None: the vehicle knows its place, so the base need not be looked at.
         """
+        known = self._place.std is not None
+        return (self._base.sightings(since_us), self.plan_std_m) if known else None
+
+    @property
+    def plan_std_m(self) -> float:
+        """Standard deviation of the place in plan, where it is larger; 0 if the vehicle knows its place."""
         std = self._place.std
-        return None if std is None else (self._base.sightings(since_us), float(std[:2].max()))
+        return 0.0 if std is None else float(std[:2].max())
+
+    def forget(self, colour: str) -> None:
+        """Drop a gate from the filter."""
+        self._place.forget(colour)
 
     def doubt(self) -> None:
         """See `PlaceEstimator.doubt`."""

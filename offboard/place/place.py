@@ -348,6 +348,11 @@ class PlaceEstimator:
         if self._filter is not None:
             self._filter.doubt(UNSEEN_M, UNSEEN_RAD)
 
+    def forget(self, colour: str) -> None:
+        """See `GateLandmarks.forget`."""
+        if self._filter is not None:
+            self._landmarks.forget(self._filter, colour)
+
     @property
     def std(self) -> Floats | None:
         """Standard deviations of x, y, z (metres) and the heading (radians); None if nothing is estimated."""

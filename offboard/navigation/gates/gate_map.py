@@ -71,6 +71,12 @@ class GateMap:
         track = self._best_tracks.get(colour)
         return None if track is None else track.covariance
 
+    def forget(self, colour: str) -> None:
+        """Drop the gate of a colour; it begins anew where it is seen next."""
+        dropped = self._best_tracks.get(colour)
+        self._tracks = [track for track in self._tracks if track is not dropped]
+        self._estimate()
+
     def is_lookalike(self, colour: str, line: LineOfSight) -> bool:
         """Whether what is seen in a direction looks like a gate of a colour, and is known to be none."""
         return self._lookalikes.are_at(colour, line.origin_m, line.direction)

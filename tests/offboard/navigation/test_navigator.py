@@ -123,3 +123,17 @@ def test_a_gate_that_is_not_certain_is_not_flown_through(monkeypatch):
         xs_m.append(state.x)
     assert 2.0 < max(xs_m) < 2.9
     assert navigator.refused
+
+
+def test_a_gate_that_is_refused_again_and_again_begins_anew(monkeypatch):
+    plan = FlightPlan(random_scenario(load_level("calm"), 1), load_mission("explorer"))
+    navigator, state, forgotten = Navigator(plan.surroundings, plan.command_limits), STATE, []
+    monkeypatch.setattr(WorldModel, "forget", lambda self, colour: forgotten.append(colour))
+    counts = []
+    for _ in range(6):
+        for action in (navigator.step_back, navigator.cross):
+            navigator.observe(state, ())
+            state = flown(state, action("red"))
+        counts.append(len(forgotten))
+    assert counts == [0, 0, 1, 1, 1, 2]
+    assert set(forgotten) == {"red"}

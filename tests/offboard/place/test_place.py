@@ -9,7 +9,7 @@ import pytest
 from framerunner.geometry.rotations import quaternion_from_euler, rotation, to_body
 from framerunner.geometry.vectors import turned
 from offboard.drone import DroneState, ImuInterval, ReportedAccuracy
-from offboard.navigation.goals import CONTEST
+from offboard.navigation.goals import CONTEST, PathGate
 from offboard.navigation.view import Surroundings
 from offboard.navigation.world_model import WorldModel
 from offboard.place.inertial_track import GRAVITY_M_S2
@@ -329,3 +329,23 @@ def test_a_picture_of_a_gate_that_is_larger_than_one_is_not_believed_to_be_one()
         gate = world.gate("red")
         assert gate is None or not gate.certain
     assert np.mean(worst) < 12.0
+
+
+def test_a_gate_by_the_arena_s_side_has_room_if_the_place_may_be_off_by_what_lacks():
+    by_side = PathGate((4.7, 1.0, 1.2), 0.3)
+    for accuracy, is_wider in ((FLOW, True), (MOCAP, False)):
+        states, world = fly(Vehicle(5, accuracy=accuracy), 12.0, lambda _: ())
+        arena, told = world.arena_with(by_side), world.arena
+        wider_m = (arena.length_x_m - told.length_x_m) / 2
+        assert (wider_m >= 0.2) == is_wider
+        assert wider_m <= (3.0 * std_m(states[-1]) if is_wider else 0.0)
+        assert world.arena_with(PathGate((3.0, 1.0, 1.2), 0.3)) == told
+
+
+def test_a_gate_that_is_forgotten_begins_anew_on_the_map_and_as_a_landmark():
+    _, world = fly(Vehicle(6), 12.0)
+    assert world.gate("red") is not None
+    assert "red" in world.localization.finish(12_000_000)
+    world.forget("red")
+    assert world.gate("red") is None
+    assert "red" not in world.localization.finish(12_000_000)

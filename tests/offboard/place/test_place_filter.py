@@ -1,16 +1,19 @@
 """The filter of the place: its derivatives, its covariance, and the IMU's integral."""
 
+from dataclasses import replace
 from math import cos, sin
 
 import numpy as np
 import pytest
 
-from framerunner.geometry.gate_shape import GateShape
+from framerunner.geometry.gate_shape import PAPER_GATE, GateShape
 from framerunner.geometry.rotations import quaternion_from_euler, rotated_by_rate, rotation, to_body
 from offboard.drone import ImuInterval
 from offboard.navigation.camera_model import CameraModel
-from offboard.navigation.gates.gate_measurement import GateView
+from offboard.navigation.gates.gate_measurement import GateView, predicted
+from offboard.navigation.gates.gate_track import CERTAIN_M
 from offboard.place.inertial_track import GRAVITY_M_S2, InertialTrack
+from offboard.place.landmarks import GATE_SIZE_STD, SIZE_STD
 from offboard.place.measurements import Eye, corners, points, report, size, stands
 from offboard.place.place_filter import OWN, TURN, TURN_SETTLING_RAD, PlaceFilter
 from scenarios.models import Camera
@@ -205,3 +208,32 @@ def test_a_doubted_place_is_known_as_well_as_before_relative_to_the_gates():
     assert place.gate_from_drone("red") == pytest.approx(before, abs=1e-9)
     assert place.p[0, 0] > 0.25
     assert place.p[OWN, OWN] > gate_m + 0.25
+
+
+def test_a_gate_is_known_as_well_far_from_where_it_was_seen_first_once_its_size_is_known():
+    place = PlaceFilter(0, (-6.0, 0.1, 1.2), (0.0, 0.0, 0.0))
+    place.add_gate("red", np.array((2.1, 0.9, 1.4, 0.3)), 1e-2 * np.eye(4), SIZE_STD)
+    for true_m in ((-6.0, 0.1, 1.2), (-3.0, -1.0, 1.3), (1.0, 0.4, 1.4)):
+        place.displace(0, tuple(np.array(true_m) - place.x[:3]), 0.05, 0.0)
+        camera = CAMERA.pose(true_m, LEVEL)
+        view = GateView(
+            "red",
+            PAPER_GATE,
+            True,
+            0,
+            camera,
+            CAMERA.focal_px,
+            (True,) * 4,
+            np.zeros(8),
+            0.25 * np.eye(8),
+            0.0,
+        )
+        expected = predicted(np.array((2.1, 0.9, 1.4, 0.3)), view)
+        for _ in range(5):
+            shown = replace(view, corners_px=expected[0])
+            model = corners(shown, Eye(CAMERA, LEVEL, (0.0, 0.0, 0.0)), OWN, place.seen_from_m["red"], 0.0)
+            place.update(model)
+        if true_m[0] == -3.0:
+            place.update(size(OWN, GATE_SIZE_STD))
+    x, y, z, _ = np.sqrt(place.gate_from_drone("red").diagonal()).tolist()
+    assert max(x, y, z) < CERTAIN_M
