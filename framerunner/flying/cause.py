@@ -12,7 +12,7 @@ from offboard.app import MissionEnd, Moment
 from offboard.navigation.view import GateEstimate, NavigationView
 from offboard.safety.operator import STOPPED
 from scenarios.crossing import Boundary
-from scenarios.models import COLOURS, Gate, Scenario
+from scenarios.models import COLOURS, Scenario, UprightGate
 from scenarios.result import FlightResult, RefereeReport
 from scenarios.verdict import Verdict
 
@@ -71,7 +71,7 @@ class CauseWatch:
         return "; ".join(part for part in parts if part)
 
     def false_gates(self, flown: Flown) -> int | None:
-        """How many places the map had a certain gate at that is none of the layout; None without a map.
+        """How many places the map had a certain gate at where no gate or decoy is; None without a map.
 
         A place is farther than `SAME_GATE_M` from each gate of its colour, as estimated and also after what
         the drone's place was off by has been subtracted. Places of a colour nearer to each other are one.
@@ -86,7 +86,7 @@ class CauseWatch:
                     error_m = flown.track.place_error_m(time_s) or (0.0, 0.0, 0.0)
                     corrected = [at - error for at, error in zip(estimate.position_m, error_m, strict=True)]
                     places = (estimate.position_m, corrected)
-                    if not any(_is_at(estimate, place, flown.layout.frames) for place in places):
+                    if not any(_is_at(estimate, place, flown.layout.all_gates) for place in places):
                         found.append(estimate)
         return len(found)
 
@@ -107,7 +107,7 @@ class CauseWatch:
         off = known or _place_off(flown.track, time_s)
         return f"touched {name} {_at(flown.track, time_s)}{off}{more}"
 
-    def _error_of_map(self, gate: Gate, time_s: float, flown: Flown) -> str:
+    def _error_of_map(self, gate: UprightGate, time_s: float, flown: Flown) -> str:
         """How far the navigator's estimate of a gate was off at a time.
 
         If the drone's place was off, the gate's is told from there: that error is common to both.
@@ -152,15 +152,15 @@ class CauseWatch:
 
 
 def _is_at(
-    estimate: GateEstimate, place_m: Sequence[float], gates: Sequence[GateEstimate] | Sequence[Gate]
+    estimate: GateEstimate, place_m: Sequence[float], gates: Sequence[GateEstimate] | Sequence[UprightGate]
 ) -> bool:
     """Whether a place, in the arena's axes, is that of one of the gates of an estimate's colour."""
     own = (gate for gate in gates if gate.colour == estimate.colour)
     return any(dist(_position_m(gate), place_m) <= SAME_GATE_M for gate in own)
 
 
-def _position_m(gate: GateEstimate | Gate) -> Sequence[float]:
-    return gate.position_arena_m if isinstance(gate, Gate) else gate.position_m
+def _position_m(gate: GateEstimate | UprightGate) -> Sequence[float]:
+    return gate.position_arena_m if isinstance(gate, UprightGate) else gate.position_m
 
 
 def lost_in(result: FlightResult, track: Track) -> str:

@@ -120,20 +120,23 @@ def test_a_place_that_was_off_is_the_cause_rather_than_the_map():
 
 
 def test_certain_gates_that_are_none_are_counted():
-    def count(*gates, **paths):
+    def count(*gates, layout=LAYOUT, **paths):
         watch = CauseWatch()
         for number, gate in enumerate(gates):
             state = DroneState(BEGAN_US + number * 1_000_000, 0.0, 0.0, 0.0, 0.0)
             view = NavigationView((gate,))
             watch.see(Moment(state, VelocityFluCommand(), Detections(), "", 1.0, navigation=view))
         end, report = MissionEnd("finished", "", "green.search", 30.0, 600), RefereeReport(verdict="clean")
-        return watch.false_gates(Flown(LAYOUT, report, end, replace(TRACK, **paths), BEGAN_US))
+        return watch.false_gates(Flown(layout, report, end, replace(TRACK, **paths), BEGAN_US))
 
     true, other = replace(RED, certain=True), replace(RED, certain=True, position_m=(3.0, 0.0, 2.0))
     assert count() is None
     assert count(true, replace(other, certain=False)) == 0
     assert count(true, other, replace(other, position_m=(3.0, 0.3, 2.0))) == 1  # the same one, moved
     assert count(other, replace(true, colour="blue")) == 2
+    crowded = load_scenario("crowded-17")
+    decoy = crowded.decoys[0]
+    assert count(replace(true, colour=decoy.colour, position_m=decoy.position_arena_m), layout=crowded) == 0
     off_m = 1.5  # the drone takes itself to be farther to the right, and so the gate
     moved = [(time_s, x, y - off_m, z) for time_s, x, y, z in zip(*TRACK_COLUMNS, strict=True)]
     seen = replace(true, position_m=(3.0, 2.0 - off_m, 2.0))
