@@ -76,8 +76,7 @@ export namespace Live {
   type Figures = { try_time_s: number | null; penalty_s: number | null; total_time_s: number | null; limit_s: number | null; time_over: boolean; crossed: (string)[]; crossing_times_s: (number | null)[]; next_colour: string | null; contacts: number | null; inside: boolean; motors_on: boolean; over: boolean; verdict: string; reason: string; source: string; final: boolean; faults?: (ActiveFault)[]; failsafe?: string };
   type FlightHistory = { kind: "history"; id: number; poses: ((number | null)[])[] };
   type GuardState = { id: string; holds: boolean | null };
-  type GuardValue = { name: string; value: number | boolean | string | null; unit: string };
-  type Guards = { kind: "guards"; id: number; time_s: number; counts: Record<string, number>; guards: (GuardState)[]; values: (GuardValue)[] };
+  type Guards = { kind: "guards"; id: number; time_s: number; counts: Record<string, number>; guards: (GuardState)[]; values: (ValueNow)[] };
   type LinkStatus = { state: "live" | "stale" | "lost"; age_s: number; loss_percent: number | null; rate_hz: number | null };
   type Map = { kind: "map"; id: number; t: number; goal: string; frames: (MappedFrame)[]; path: ([number, number, number])[]; place: EstimatedPlace | null };
   type MappedFrame = { colour: string; p: [number, number, number]; yaw: number; std: [number, number, number] | null; yaw_std: number | null; certain: boolean; ambiguous: boolean; views: number; size: [number, number] | null };
@@ -88,6 +87,7 @@ export namespace Live {
   type Text = { kind: "text"; id: number; time_s: number; severity: number; text: string; from: "drone" | "mission" };
   type Transition = { time_s: number; from: string; to: string; when: string; values: ([string, number | boolean | string | null])[]; seconds: number; ids: (string)[] };
   type Transitions = { kind: "transitions"; id: number; list: (Transition)[] };
+  type ValueNow = { name: string; value: number | boolean | string | null; unit: string };
   type World = { kind: "world"; scenario: Record<string, any> | null; lift_m: number; source: string };
   type ToPage = World | Poses | Status | FlightHistory | Detections | Map | Chart | Transitions | Guards | Text | Notice;
 }
