@@ -7,7 +7,7 @@ from math import dist, hypot, isfinite, sqrt
 from framerunner.geometry.axes import flip_quaternion, flip_vector, flip_yaw
 from framerunner.geometry.rotations import rotation, rotation_rows, to_body, to_world, yaw_of
 from framerunner.geometry.solids import Solid
-from framerunner.geometry.vectors import ZERO3, Vec3
+from framerunner.geometry.vectors import ZERO3, Vec3, minus, plus
 from framerunner.vehicle.airframe import GRAVITY_M_S2, Airframe
 from framerunner.vehicle.measurements import MotorSpeeds, Sensors
 from scenarios.models import Scenario, TrueState, is_over_base, start_position
@@ -274,8 +274,8 @@ class World:
             if found is None:
                 continue
             touching[solid] = found.normal_arena
-            arm = _minus(found.point_arena_m, position)
-            push = self._touch_force(found.depth_m, found.normal_arena, _plus(motion, _cross(spin, arm)))
+            arm = minus(found.point_arena_m, position)
+            push = self._touch_force(found.depth_m, found.normal_arena, plus(motion, _cross(spin, arm)))
             twist = _cross(arm, push)
             for i in range(3):
                 force[i] += push[i]
@@ -304,11 +304,11 @@ class World:
         contact = self.airframe.contact
         closing = -(normal[0] * velocity_m_s[0] + normal[1] * velocity_m_s[1] + normal[2] * velocity_m_s[2])
         pressing = max(0.0, contact.stiffness_n_m * depth_m + contact.damping_n_s_m * closing)
-        sliding = _plus(velocity_m_s, _scaled(normal, closing))
+        sliding = plus(velocity_m_s, _scaled(normal, closing))
         speed = hypot(*sliding)
         # Coulomb friction, replaced by a damper near standstill.
         drag = min(contact.friction * pressing / speed, contact.damping_n_s_m) if speed > 1e-9 else 0.0
-        return _plus(_scaled(normal, pressing), _scaled(sliding, -drag))
+        return plus(_scaled(normal, pressing), _scaled(sliding, -drag))
 
 
 class _Group:
@@ -324,14 +324,6 @@ class _Group:
     def gap_m(self, point_m: Vec3) -> float:
         """Distance of a point from the sphere, below zero inside."""
         return dist(point_m, self._centre_arena_m) - self._radius_m
-
-
-def _plus(a: Vec3, b: Vec3) -> Vec3:
-    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
-
-
-def _minus(a: Vec3, b: Vec3) -> Vec3:
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 def _scaled(a: Vec3, factor: float) -> Vec3:

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from framerunner.geometry.rotations import Rotation, multiply, rotation, to_world, yaw_of
-from framerunner.geometry.vectors import Quaternion, Vec3
+from framerunner.geometry.vectors import Quaternion, Vec3, minus
 from framerunner.wire.vehicle_telemetry import VehiclePose, VehicleTelemetry
 
 Array = npt.NDArray[np.float64]
@@ -110,7 +110,7 @@ class MotionCheck:
             newest = self._sent[-1]  # before the vehicle knows a position
             heading, tilt = _turns(newest.attitude, attitude.attitude_ned)
             return (nan, heading, tilt)
-        distances = [hypot(*_minus(reported.position_ned_m, sent.position_ned_m)) for sent, reported in pairs]
+        distances = [hypot(*minus(reported.position_ned_m, sent.position_ned_m)) for sent, reported in pairs]
         turns = [_turns(sent.attitude, reported.attitude_ned) for sent, reported in pairs]
         headings, tilts = zip(*turns, strict=True)
         return (float(np.median(distances)), float(np.median(headings)), float(np.median(tilts)))
@@ -123,8 +123,8 @@ class MotionCheck:
             if start is None:
                 start = (sent, reported)
             elif sent.time_us - start[0].time_us >= _COMPARE_US:
-                reported_step = _minus(reported.position_ned_m, start[1].position_ned_m)
-                steps.append((_minus(sent.position_ned_m, start[0].position_ned_m), reported_step))
+                reported_step = minus(reported.position_ned_m, start[1].position_ned_m)
+                steps.append((minus(sent.position_ned_m, start[0].position_ned_m), reported_step))
                 start = (sent, reported)
         if not steps:
             return ""
@@ -252,10 +252,6 @@ def _turns(pose: Quaternion, vehicle: Quaternion) -> tuple[float, float]:
 def _down(m: Rotation) -> Vec3:
     """World down in body axes."""
     return (m[6], m[7], m[8])
-
-
-def _minus(a: Vec3, b: Vec3) -> Vec3:
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 def body_velocity(attitude: Quaternion, velocity_ned_m_s: Vec3) -> Vec3:

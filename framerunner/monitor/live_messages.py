@@ -13,6 +13,8 @@ from typing import (
 
 from typing_extensions import TypedDict
 
+from framerunner.wire.mission_report import EstimatedPlace, MappedFrame, Plain, ValueNow
+
 Number = float | None
 Vector = tuple[float, float, float]
 
@@ -148,29 +150,6 @@ class Detections(TypedDict):
     boxes: dict[str, list[Number] | None]
 
 
-class MappedFrame(TypedDict):
-    """A gate as a navigator estimates it."""
-
-    colour: str
-    p: Vector
-    yaw: float
-    std: Vector | None
-    yaw_std: Number
-    certain: bool
-    ambiguous: bool
-    views: int
-    size: tuple[float, float] | None
-
-
-class EstimatedPlace(TypedDict):
-    """Where an app itself has estimated its drone to be, with standard deviations."""
-
-    p: Vector
-    yaw: float
-    std: Vector
-    yaw_std: float
-
-
 class Map(TypedDict):
     """What a navigator knows and plans; `place` is null if it believes what its vehicle reports."""
 
@@ -201,7 +180,7 @@ Transition = TypedDict(
         "from": str,
         "to": str,
         "when": str,
-        "values": list[tuple[str, float | bool | str | None]],
+        "values": list[tuple[str, Plain]],
         "seconds": float,
         "ids": list[str],
     },
@@ -223,14 +202,6 @@ class GuardState(TypedDict):
     holds: bool | None
 
 
-class GuardValue(TypedDict):
-    """What guards read."""
-
-    name: str
-    value: float | bool | str | None
-    unit: str
-
-
 class Guards(TypedDict):
     """The guards of a mission's active states, and how often each transition was taken."""
 
@@ -239,7 +210,7 @@ class Guards(TypedDict):
     time_s: float
     counts: dict[str, int]
     guards: list[GuardState]
-    values: list[GuardValue]
+    values: list[ValueNow]
 
 
 Text = TypedDict(

@@ -84,7 +84,6 @@ class GimbalComponent(DeviceComponent):
         )
 
     def _information(self) -> Message:
-        limits = self._gimbal.limits
         major, minor, patch = OWN_VERSION
         return mavlink.MAVLink_gimbal_device_information_message(
             boot_ms(self._exchange.time_us),
@@ -98,8 +97,5 @@ class GimbalComponent(DeviceComponent):
             0,
             0.0,
             0.0,
-            limits.pitch_min_rad,
-            limits.pitch_max_rad,
-            -limits.yaw_max_rad,
-            limits.yaw_max_rad,
+            *self._gimbal.limits.ranges_rad,
         )

@@ -199,17 +199,13 @@ class GimbalManager(AutopilotService):
         )
 
     def _information(self) -> Message:
-        limits = self._gimbal.limits
         return mavlink.MAVLink_gimbal_manager_information_message(
             boot_ms(self._exchange.time_us),
             CAPABILITIES | _CAN_POINT_AT_PLACES,
             GIMBAL_COMPONENT_ID,
             0.0,
             0.0,
-            limits.pitch_min_rad,
-            limits.pitch_max_rad,
-            -limits.yaw_max_rad,
-            limits.yaw_max_rad,
+            *self._gimbal.limits.ranges_rad,
         )
 
 

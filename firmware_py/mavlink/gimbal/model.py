@@ -17,6 +17,11 @@ class GimbalLimits:
     pitch_max_rad: float
     yaw_max_rad: float  # to either side
 
+    @property
+    def ranges_rad(self) -> tuple[float, float, float, float]:
+        """Least and greatest pitch, least and greatest yaw."""
+        return self.pitch_min_rad, self.pitch_max_rad, -self.yaw_max_rad, self.yaw_max_rad
+
 
 @dataclass(frozen=True, slots=True)
 class GimbalTarget:

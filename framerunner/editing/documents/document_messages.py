@@ -105,22 +105,27 @@ class Place(TypedDict):
     y: float
 
 
-class StatusMessage(TypedDict):
+class _Message(TypedDict, total=False):
+    """What each message may have: how many others look, a warning, and which request it answers, and how."""
+
+    others: int
+    warning: str
+    answers: int
+    refused: str
+    code: str
+
+
+class StatusMessage(_Message):
     """What a page shows beside the document; only what is told has changed."""
 
     kind: Literal["status"]
     saved: NotRequired[bool]
     can_undo: NotRequired[bool]
     can_redo: NotRequired[bool]
-    others: NotRequired[int]
     layout: NotRequired[dict[str, Place]]
-    warning: NotRequired[str]
-    answers: NotRequired[int]
-    refused: NotRequired[str]
-    code: NotRequired[str]
 
 
-class _Document(TypedDict):
+class _Document(_Message):
     saved: bool
     can_undo: bool
     can_redo: bool
@@ -137,11 +142,7 @@ class _Document(TypedDict):
     spanish: NotRequired[list[str]]
     layout: dict[str, Place]
     catalogue: NotRequired[Catalogue]
-    answers: NotRequired[int]
-    refused: NotRequired[str]
-    code: NotRequired[str]
-    warning: NotRequired[str]
-    others: NotRequired[int]
+    answered: NotRequired[int]
 
 
 class DocumentMessage(_Document):
@@ -149,7 +150,6 @@ class DocumentMessage(_Document):
 
     kind: Literal["document"]
     text: str
-    answered: NotRequired[int]
     changes: NotRequired[list[TypedChange]]
 
 
@@ -159,7 +159,6 @@ class ChangedMessage(_Document):
     kind: Literal["changed"]
     changes: list[TypedChange]
     text: NotRequired[str]
-    answered: NotRequired[int]
 
 
 ToPage = DocumentMessage | ChangedMessage | StatusMessage

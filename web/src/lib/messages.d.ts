@@ -17,16 +17,16 @@ export namespace Documents {
   type TypedChange = { start: number; removed: number; inserted: string };
   type FromPage = EditMessage | TypeMessage | StepMessage | SaveMessage | LayoutMessage;
   type Catalogue = { values: (ValueEntry)[]; primitives: (PrimitiveEntry)[]; operators: (string)[] };
-  type ChangedMessage = { saved: boolean; can_undo: boolean; can_redo: boolean; name: string; revision: number; session: string; restored: boolean; problem: string; diagram: Diagram; mission: Record<string, string>; variables: Record<string, string>; templates: (string)[]; findings: (Finding)[]; spanish?: (string)[]; layout: Record<string, Place>; catalogue?: Catalogue; answers?: number; refused?: string; code?: string; warning?: string; others?: number; kind: "changed"; changes: (TypedChange)[]; text?: string; answered?: number };
+  type ChangedMessage = { others?: number; warning?: string; answers?: number; refused?: string; code?: string; saved: boolean; can_undo: boolean; can_redo: boolean; name: string; revision: number; session: string; restored: boolean; problem: string; diagram: Diagram; mission: Record<string, string>; variables: Record<string, string>; templates: (string)[]; findings: (Finding)[]; spanish?: (string)[]; layout: Record<string, Place>; catalogue?: Catalogue; answered?: number; kind: "changed"; changes: (TypedChange)[]; text?: string };
   type Diagram = { name: string; initial: string; nodes: (Node)[]; edges: (Edge)[]; settings?: Record<string, string>; variables?: Record<string, string>; templates?: Record<string, (string)[]>; readable: boolean };
-  type DocumentMessage = { saved: boolean; can_undo: boolean; can_redo: boolean; name: string; revision: number; session: string; restored: boolean; problem: string; diagram: Diagram; mission: Record<string, string>; variables: Record<string, string>; templates: (string)[]; findings: (Finding)[]; spanish?: (string)[]; layout: Record<string, Place>; catalogue?: Catalogue; answers?: number; refused?: string; code?: string; warning?: string; others?: number; kind: "document"; text: string; answered?: number; changes?: (TypedChange)[] };
+  type DocumentMessage = { others?: number; warning?: string; answers?: number; refused?: string; code?: string; saved: boolean; can_undo: boolean; can_redo: boolean; name: string; revision: number; session: string; restored: boolean; problem: string; diagram: Diagram; mission: Record<string, string>; variables: Record<string, string>; templates: (string)[]; findings: (Finding)[]; spanish?: (string)[]; layout: Record<string, Place>; catalogue?: Catalogue; answered?: number; kind: "document"; text: string; changes?: (TypedChange)[] };
   type Edge = { id: string; source: string; target: string; missing: boolean; event: "tick" | "done" | "resume"; order: number; when: string; actions: (string)[]; source_state: string; source_index: number; span: Span | null; when_span: Span | null; to_span: Span | null };
   type Finding = { severity: "error" | "warning" | "advice"; code: string; message: string; file: string; line: number; column: number; start: number; end: number; state: string; event: "tick" | "done" | "resume" | null; index: number | null; section: "enter" | "during" | "exit" | string; nodes: (string)[] };
   type Node = { id: string; name: string; parent: string; initial: string; final: boolean; finish: boolean; enter: (string)[]; during: (string)[]; exit: (string)[]; parameters: ([string, string])[]; template: string; source: string; span: Span | null; name_span: Span | null };
   type Place = { x: number; y: number };
   type PrimitiveEntry = { name: string; text: string; help: string; needs_map: boolean; own: boolean };
   type Span = { start: number; end: number };
-  type StatusMessage = { kind: "status"; saved?: boolean; can_undo?: boolean; can_redo?: boolean; others?: number; layout?: Record<string, Place>; warning?: string; answers?: number; refused?: string; code?: string };
+  type StatusMessage = { others?: number; warning?: string; answers?: number; refused?: string; code?: string; kind: "status"; saved?: boolean; can_undo?: boolean; can_redo?: boolean; layout?: Record<string, Place> };
   type ValueEntry = { name: string; type: string; text: string; unit: string; low: number | null; high: number | null; choices: (any)[]; assignable: boolean; needs_map: boolean; own: boolean };
   type ToPage = DocumentMessage | ChangedMessage | StatusMessage;
 }
@@ -76,8 +76,7 @@ export namespace Live {
   type Figures = { try_time_s: number | null; penalty_s: number | null; total_time_s: number | null; limit_s: number | null; time_over: boolean; crossed: (string)[]; crossing_times_s: (number | null)[]; next_colour: string | null; contacts: number | null; inside: boolean; motors_on: boolean; over: boolean; verdict: string; reason: string; source: string; final: boolean; faults?: (ActiveFault)[]; failsafe?: string };
   type FlightHistory = { kind: "history"; id: number; poses: ((number | null)[])[] };
   type GuardState = { id: string; holds: boolean | null };
-  type GuardValue = { name: string; value: number | boolean | string | null; unit: string };
-  type Guards = { kind: "guards"; id: number; time_s: number; counts: Record<string, number>; guards: (GuardState)[]; values: (GuardValue)[] };
+  type Guards = { kind: "guards"; id: number; time_s: number; counts: Record<string, number>; guards: (GuardState)[]; values: (ValueNow)[] };
   type LinkStatus = { state: "live" | "stale" | "lost"; age_s: number; loss_percent: number | null; rate_hz: number | null };
   type Map = { kind: "map"; id: number; t: number; goal: string; frames: (MappedFrame)[]; path: ([number, number, number])[]; place: EstimatedPlace | null };
   type MappedFrame = { colour: string; p: [number, number, number]; yaw: number; std: [number, number, number] | null; yaw_std: number | null; certain: boolean; ambiguous: boolean; views: number; size: [number, number] | null };
@@ -88,6 +87,7 @@ export namespace Live {
   type Text = { kind: "text"; id: number; time_s: number; severity: number; text: string; from: "drone" | "mission" };
   type Transition = { time_s: number; from: string; to: string; when: string; values: ([string, number | boolean | string | null])[]; seconds: number; ids: (string)[] };
   type Transitions = { kind: "transitions"; id: number; list: (Transition)[] };
+  type ValueNow = { name: string; value: number | boolean | string | null; unit: string };
   type World = { kind: "world"; scenario: Record<string, any> | null; lift_m: number; source: string };
   type ToPage = World | Poses | Status | FlightHistory | Detections | Map | Chart | Transitions | Guards | Text | Notice;
 }
