@@ -25,6 +25,8 @@ _WIDE_PX: Final = 4.5  # a strip wider than this has its colour seen whatever th
 _THIN_SHARE: Final = 0.3  # standard deviation of where within a thin strip the edge is seen
 _COMMON_PX: Final = 0.15  # standard deviation of what is common to an edge
 _ROUNDED_PX: Final = 0.15  # standard deviation of a place without noise
+_BEYOND: Final = 0.35  # share of the step by which a profile may go beyond both colours
+_OF_NOISE: Final = 2.0  # standard deviations of noise by which it may do so more
 _BROADER: Final = 1.5  # than usual: the step of more than one edge
 _NO_NEIGHBOUR_PX: Final = 1e3
 
@@ -165,6 +167,7 @@ def measured(pixels: Pixels, edges: SeenEdges, places: EdgePlaces, noise: float)
         axis=-1,
     )
     colours = pixels.at(places.points_px[:, :, None] + offsets[..., None] * edges.normal[:, None, None])
+    colours = _mean_of_neighbours(colours, clear)
     inner, outer = colours[:, :, :2].mean(axis=2), colours[:, :, -2:].mean(axis=2)
     step = outer - inner
     square = np.maximum((step * step).sum(axis=-1), 1e-9)
@@ -180,13 +183,29 @@ def measured(pixels: Pixels, edges: SeenEdges, places: EdgePlaces, noise: float)
     breadth = width * (4.0 * level * (1.0 - level)).mean(axis=-1)
     single = clear & (thin == 0.0) & (contrast >= noise * 4.0)
     usual = float(np.median(breadth[single])) if single.any() else 0.0
-    straight = (level > -0.35).all(axis=-1) & (level < 1.35).all(axis=-1)
-    straight &= (breadth < _BROADER * usual + 0.2) | (thin > 0.0)
+    # Noise bends a weak step's profile as other edges bend that of a strong one.
+    of_level = noise / np.sqrt(square)
+    beyond = (_BEYOND + _OF_NOISE * of_level)[..., None]
+    straight = (np.abs(level - 0.5) < 0.5 + beyond).all(axis=-1)
+    straight &= (breadth < _BROADER * usual + 0.2 + _OF_NOISE * of_level) | (thin > 0.0)
     common = np.hypot(_THIN_SHARE * thin, _COMMON_PX)
     return EdgeMeasurements(
         off, np.hypot(of_noise, _ROUNDED_PX), common, contrast, clear & (thin == 0.0), clear & straight,
         inner, outer, clear & (gap_in > _WIDE_PX), clear & (gap_out > _WIDE_PX),
     )  # fmt: skip
+
+
+def _mean_of_neighbours(colours: Floats, clear: Flags) -> Floats:
+    """Profiles along each edge, shape (k, m, n, 3), each averaged with those beside it that are clear.
+
+    Noise and the floor's texture become less, and an edge, which is straight, stays where it is.
+    """
+    weights = np.pad(clear.astype(np.float64), ((0, 0), (1, 1)))[..., None, None]
+    padded = np.pad(colours, ((0, 0), (1, 1), (0, 0), (0, 0))) * weights
+    total = padded[:, :-2] + padded[:, 1:-1] + padded[:, 2:]
+    count = weights[:, :-2] + weights[:, 1:-1] + weights[:, 2:]
+    mean: Floats = np.where(clear[..., None, None], total / np.maximum(count, 1.0), colours)
+    return mean
 
 
 def _room(gap_px: Floats, beyond_px: Floats) -> Floats:

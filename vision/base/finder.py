@@ -47,7 +47,9 @@ _LEAST_CONTRAST: Final = 8.0  # of 255
 _CONTRAST_OF_NOISE: Final = 4.0
 _LEAST_OUTLINE_PX: Final = 30.0
 _UPRIGHT_PX: Final = 8.0  # a longer upright edge of the outline must be seen
+_LEAST_SHARE: Final = 0.5  # of the outline
 _LEAST_EDGES: Final = 3
+_WEAK_SHARE: Final = 0.6  # by which a place without contrast counts less than one with an edge elsewhere
 _AGREED: Final = 0.75  # share of all edges seen that must be where the fitted cube has them
 _ALIKE: Final = 0.4  # of the contrast: how much the colours of one face may differ
 _FARTHEST: Final = 4.0  # standard deviations from what is expected
@@ -204,18 +206,21 @@ class _Attempt:
             return 0.0
         edges, seen = fit.edges, fit.measurements
         outline = edges.outer == BACKGROUND
-        shares = (fit.good & seen.clear).sum(axis=1) / np.maximum(seen.clear.sum(axis=1), 1)
-        clear_px = edges.length_px * seen.clear.mean(axis=1)
+        weak = seen.clear & (seen.contrast < self.least)  # there base and background look alike
+        counts = seen.clear - _WEAK_SHARE * weak
+        shares = (fit.good & seen.clear).sum(axis=1) / np.maximum(counts.sum(axis=1), 1e-9)
+        clear_px = edges.length_px * counts.mean(axis=1)
         good_px = edges.length_px * fit.good.mean(axis=1)
         found = good_px > 0.5 * edges.length_px
         upright = self.camera.shape.is_upright(edges.number) & outline & (edges.length_px > _UPRIGHT_PX)
         visible = seen.used & seen.clear & (seen.contrast >= self.least)
         agreed = float((visible & fit.good).sum() / max(visible.sum(), 1))
         if (
-            good_px[outline].sum() < _LEAST_OUTLINE_PX
+            good_px[outline].sum() < max(_LEAST_OUTLINE_PX, _LEAST_SHARE * edges.length_px[outline].sum())
             or found.sum() < _LEAST_EDGES
             or (found & outline).sum() < 2
-            or not found[upright].all()
+            or (upright & ~found & (weak.sum(axis=1) <= 0.5 * seen.clear.sum(axis=1))).any()
+            or (upright.any() and not found[upright].any())
             or agreed < _AGREED
             or not self._is_plain(fit)
         ):
