@@ -180,7 +180,7 @@ def fly(
 
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
 
-        framerunner fly --vio --drone serial:///dev/ttyUSB0:921600 --camera 0 --calibration camera.json
+        framerunner fly --vio --drone serial:///dev/ttyUSB0:921600 --camera 0
 
         framerunner fly --settings flight.yaml
 
