@@ -59,6 +59,9 @@ if TYPE_CHECKING:
     from scenarios.models import Scenario
 
 
+ALONE = "vio"  # sensors of a drone that has its place from the app
+
+
 @Parameter(name="*", group=DRONE_GROUP)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DroneOptions:
@@ -74,6 +77,8 @@ class DroneOptions:
             without --camera its camera is used. By default that of an http --camera, if there is one
         drone_limits: with --drone, for a mission of class open: what the drone can do in m/s and rad/s,
             forward=2,left=1.5,up=1,yaw-rate=1.5; down=NUMBER if it is not as up
+        vio: with --drone: it knows its place only by what this program estimates with its camera and IMU, and
+            is sent it as ODOMETRY; at first that it stands on the start
     """
 
     drone: str | None = None
@@ -82,6 +87,7 @@ class DroneOptions:
     calibration: Path | None = None
     simulator: str | None = None
     drone_limits: str | None = None
+    vio: bool = False
 
 
 @Parameter(name="*", group=SIMULATION_GROUP)
@@ -139,6 +145,7 @@ _RULES = (
     ),
     OptionRule("response", "is for a simulated vehicle in lockstep; add --lockstep", needs=("lockstep",)),
     OptionRule("drone-limits", "is for a drone given by --drone; leave it out", needs=("drone",)),
+    OptionRule("vio", "is for a drone given by --drone; others have --sensors vio", needs=("drone",)),
     *HARDWARE_RULES,
 )
 """Which options exclude or need which others; the first rule that is broken is told."""
@@ -173,6 +180,8 @@ def fly(
 
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
 
+        framerunner fly --vio --drone serial:///dev/ttyUSB0:921600 --camera 0
+
         framerunner fly --settings flight.yaml
 
     Args:
@@ -202,6 +211,7 @@ def fly(
 
     loaded = load_mission(mission, pilot)
     chosen = _scenario(scenario, simulated, hardware, autopilot, starts=drone is None)
+    chosen = with_sensors(chosen, ALONE if flown.vio else None)
     plan = replace(_plan(chosen, loaded, flown, simulated, autopilot), caps=caps_of(hardware, drone))
     with _instance(simulated.instance, autopilot) as number:
         real_time = RealTimeSettings(

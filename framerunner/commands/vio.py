@@ -22,8 +22,8 @@ def vio(
 
     The drone stands on the scenario's start when this begins, and no app needs to fly it: a pilot may. It is
     sent ODOMETRY 20 times a second, as `framerunner mocap` sends poses, with the same line each second and
-    the same report at the end. Its height is its own, by a range finder. In `fly` the app itself does this
-    for a drone with the sensors `vio`; do not run both.
+    the same report at the end. Its height is its own, by a range finder. `fly --vio` does this itself; do not
+    run both.
 
     Exit code 0: the drone uses the poses and nothing is wrong, 1: something is missing, 2: bad input.
 

@@ -200,7 +200,8 @@ def _measure(
     plan: FlightPlan, settings: PreflightSettings, fence: FlightFence, cancelled: threading.Event
 ) -> _Measured:
     """All that is done on the link; blocks."""
-    with open_client(settings.drone_url, cancelled) as client:
+    standing = Pose(plan.start_pose[:3], plan.start_pose[3]) if plan.alone else None
+    with open_client(settings.drone_url, cancelled, standing) as client:
         listen(client, LISTEN_S)
         record = client.session
         round_trips_s = client.round_trips_s()

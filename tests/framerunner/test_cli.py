@@ -154,6 +154,7 @@ def test_a_drone_needs_a_camera_and_a_camera_a_drone(refused):
 
 def test_a_running_simulator_needs_the_url_of_its_drone_and_a_valid_one_itself(refused):
     assert "--drone" in refused("fly", "--simulator", "http://127.0.0.1:8100")
+    assert "--vio: is for a drone given by --drone" in refused("fly", "--vio")
     line = refused("fly", "--drone", "udpin://127.0.0.1:25099", "--simulator", "127.0.0.1:8100")
     assert "--simulator '127.0.0.1:8100'" in line and "http://HOST:PORT" in line
 

@@ -1,5 +1,7 @@
 """The checks before arming, on a simulated drone in simulated time."""
 
+from dataclasses import replace
+
 import pytest
 
 from firmware_py.missions.items import PlanType
@@ -48,6 +50,18 @@ async def test_each_check_is_told_and_a_failing_one_prevents_arming(link, plan, 
     assert load_kept(report.kept) == KeptState(uid_of(link), (), ())  # there was no fence
     line = next(check.line for check in report.checks if check.name == "NAV_RCL_ACT")
     assert line.startswith("FAIL     NAV_RCL_ACT: 2 (return) (allowed: 3 (land)); set it to 3 (land)")
+
+
+async def test_a_drone_that_knows_no_place_is_told_where_it_stands(link, plan, tmp_path):
+    await run_preflight(plan, settings(tmp_path))
+    assert not [message for message in link.sent if message.get_type() == "ODOMETRY"]
+    alone = plan.scenario.model_copy(update={"sensors": "vio"})
+    await run_preflight(replace(plan, scenario=alone), settings(tmp_path))
+    start = plan.start_pose
+    told = [message for message in link.sent if message.get_type() == "ODOMETRY"]
+    assert told
+    for message in told:
+        assert (message.x, message.y) == pytest.approx((start[0], -start[1]), abs=1e-3)
 
 
 async def test_the_fence_is_on_the_vehicle_and_read_back(link, plan, tmp_path):
