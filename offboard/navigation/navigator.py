@@ -16,7 +16,7 @@ from offboard.limits import CONTEST, CommandLimits
 from offboard.navigation.base_approach import SIGHTINGS_S, WayHome
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.crossing_attempt import CrossingAttempt
-from offboard.navigation.goals import Goal, Point, style_of
+from offboard.navigation.goals import Goal, PathGate, Point, style_of
 from offboard.navigation.path_flight import STILL, PathFlight, position_now
 from offboard.navigation.search.looking_places import LookingPlaces
 from offboard.navigation.view import NavigationView, Surroundings
@@ -205,6 +205,8 @@ class Navigator:
         if crossing is None or crossing.colour != colour or crossing.refusal:
             crossing = self._crossing = CrossingAttempt(colour, now_s, now_s, now_s)
         crossing.move(position_now(state), now_s)
+        if crossing.cleared:
+            self._refusals.pop(colour, None)
         estimate = self._world.gate(colour)
         goes_on = crossing.is_committed or (estimate is not None and crossing.is_settled(estimate))
         if goes_on and crossing.is_on(self._flight.path):
@@ -230,8 +232,10 @@ class Navigator:
                 self._flight.leave()
                 return self._flight.follow(state)
             return command
-        self._flight.arena = self._world.arena_with(gate)
-        command = self._fly(gate, *self._goals_after(colour))
+        after = self._goals_after(colour)
+        gates_after = [goal for goal in after if isinstance(goal, PathGate)]
+        self._flight.arena = self._world.arena_with(gate, *gates_after)
+        command = self._fly(gate, *after)
         path = self._flight.path
         finds_way = path is not None or self._flight.looks
         no_path = "" if finds_way else self._flight.refusal or "none was planned"

@@ -130,8 +130,8 @@ class WorldModel:
         )
 
     def gate_of(self, gate: GateEstimate) -> PathGate:
-        """A gate as a path crosses it: in the arena, also while it seems to be outside, seen from afar."""
-        arena = self._surroundings.arena
+        """A gate as a path crosses it: in the arena that it has, also while it seems to be outside."""
+        arena = self.arena_with(PathGate(gate.position_m, gate.yaw_rad, gate.shape))
         half_m = gate.shape.outer_height_m / 2
         x_m, y_m = arena.length_x_m / 2, arena.width_y_m / 2
         x, y, z = gate.position_m
@@ -147,8 +147,8 @@ class WorldModel:
         """The arena, as it is told."""
         return self._surroundings.arena
 
-    def arena_with(self, gate: PathGate) -> Arena:
-        """The arena in which a gate is crossed.
+    def arena_with(self, *gates: PathGate) -> Arena:
+        """The arena in which gates are crossed.
 
         A gate has room before and behind its opening. If it seems to have none, the drone's place is wrong,
         and the sides are farther away by that.
@@ -156,14 +156,14 @@ class WorldModel:
         arena, std_m = self._surroundings.arena, self.localization.plan_std_m
         if std_m == 0.0:
             return arena
-        (x, y, _), yaw = gate.centre_m, gate.yaw_rad
-        room_m = LEAST_STRAIGHT_M + deeper_m(gate.shape)
-        over_m = max(
-            abs(x) + room_m * abs(cos(yaw)) - arena.length_x_m / 2,
-            abs(y) + room_m * abs(sin(yaw)) - arena.width_y_m / 2,
-        )
+        overs_m = []
+        for gate in gates:
+            (x, y, _), yaw = gate.centre_m, gate.yaw_rad
+            room_m = LEAST_STRAIGHT_M + deeper_m(gate.shape)
+            overs_m.append(abs(x) + room_m * abs(cos(yaw)) - arena.length_x_m / 2)
+            overs_m.append(abs(y) + room_m * abs(sin(yaw)) - arena.width_y_m / 2)
         wider_m = min(
-            over_m + self._style.side_margin_m + SIDES_SPARE_M, SIDES_STD * std_m, arena.margin_m / 2
+            max(overs_m) + self._style.side_margin_m + SIDES_SPARE_M, SIDES_STD * std_m, arena.margin_m / 2
         )
         if wider_m <= 0.0:
             return arena

@@ -72,9 +72,10 @@ class GateMap:
         return None if track is None else track.covariance
 
     def forget(self, colour: str) -> None:
-        """Drop the gate of a colour; it begins anew where it is seen next."""
+        """Drop the gate of a colour and what looked like one; it begins anew where it is seen next."""
         dropped = self._best_tracks.get(colour)
         self._tracks = [track for track in self._tracks if track is not dropped]
+        self._lookalikes.forget(colour)
         self._estimate()
 
     def is_lookalike(self, colour: str, line: LineOfSight) -> bool:

@@ -99,6 +99,11 @@ class Lookalikes:
         self._found.append(lookalike)
         return lookalike
 
+    def forget(self, colour: str) -> None:
+        """Begin anew with a colour: what was found while the drone's place was wrong may be a gate."""
+        self._sightings.pop(colour, None)
+        self._found = [each for each in self._found if each.colour != colour]
+
     def shows(self, view: GateView) -> bool:
         """Whether a view is of such a thing."""
         found = [each for each in self._found if each.colour == view.colour]

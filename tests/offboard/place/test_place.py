@@ -10,7 +10,7 @@ from framerunner.geometry.rotations import quaternion_from_euler, rotation, to_b
 from framerunner.geometry.vectors import turned
 from offboard.drone import DroneState, ImuInterval, ReportedAccuracy
 from offboard.navigation.goals import CONTEST, PathGate
-from offboard.navigation.view import Surroundings
+from offboard.navigation.view import GateEstimate, Surroundings
 from offboard.navigation.world_model import WorldModel
 from offboard.place.inertial_track import GRAVITY_M_S2
 from scenarios.models import Arena, Base, Camera
@@ -340,6 +340,10 @@ def test_a_gate_by_the_arena_s_side_has_room_if_the_place_may_be_off_by_what_lac
         assert (wider_m >= 0.2) == is_wider
         assert wider_m <= (3.0 * std_m(states[-1]) if is_wider else 0.0)
         assert world.arena_with(PathGate((3.0, 1.0, 1.2), 0.3)) == told
+        assert world.arena_with(PathGate((3.0, 1.0, 1.2), 0.3), by_side) == arena
+        beyond = GateEstimate("red", (5.2, 1.0, 1.2), 0.3, (0.1, 0.1, 0.1), 0.1, False, False, 9, 0)
+        crossed_m = world.gate_of(beyond).centre_m[0]
+        assert crossed_m == pytest.approx(5.2 if is_wider else told.length_x_m / 2)
 
 
 def test_a_gate_that_is_forgotten_begins_anew_on_the_map_and_as_a_landmark():

@@ -234,6 +234,8 @@ def test_a_picture_of_another_size_is_no_gate(size: float, heading_deg: int) -> 
     aside = LineOfSight((0.0, 2.0, 2.0), (1.0, 0.0, 0.0))
     assert [flight.map.is_lookalike("red", line) for line in (ahead, aside)] == [True, False]
     assert not flight.map.is_lookalike("blue", ahead)
+    flight.map.forget("red")
+    assert not flight.map.is_lookalike("red", ahead)
 
 
 def test_a_gate_before_a_picture_of_its_colour_stays_on_the_map() -> None:
