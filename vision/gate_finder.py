@@ -49,7 +49,6 @@ _THIN_BAR_SHARE = (
     1 / 128
 )  # of the image's width; wider bars have pixels of their own colour, which tell their width
 _SURE = 0.6  # chance from which on a gate is found by networks alone
-_CERTAIN = 0.97  # and one with wide bars
 _OPENING_PX = 12  # a region smaller than this is not looked at for an opening
 
 
@@ -113,7 +112,9 @@ class GateFinder:
             seen = find_outlines(image)
         if seen is not None:
             chances, outlines = seen
-            found = self._with_outlines(image, _likely(image, found, outlines), chances, outlines)
+            found = _likely(image, found, outlines)
+            known = [box for box, _ in found]
+            found += self._of_outlines(image, known, outlines[chances > _SURE])
         edges = self._obstacle_edges(masks)
         height, width = image.shape[:2]
         by_colour = {c: [one for one in found if one[1].colour == c] for c in PRIMARIES}
@@ -146,30 +147,22 @@ class GateFinder:
                 return alone
         return [] if sighting is None else [sighting]
 
-    def _with_outlines(
-        self, image: Image, found: list[_Found], chances: Floats, outlines: Outlines
-    ) -> list[_Found]:
-        """Some gates, and those that networks see where none of them is whole.
-
-        What is a part of a gate by its pixels, and a whole one of the same colour by the networks, is whole:
-        something of its colour beside it spoiled its sides.
-        """
+    def _of_outlines(self, image: Image, known: Sequence[_Box], outlines: Outlines) -> list[_Found]:
+        """The gates that networks see outside boxes."""
+        found: list[_Found] = []
         bright = 0.0
-        for chance, outline in zip(chances.tolist(), outlines, strict=True):
-            around = [one for one in found if _is_inside(outline, one[0])]
-            if chance <= _SURE or any(sighting.whole for _, sighting in around):
+        for outline in outlines:
+            if any(_is_inside(outline, box) for box in known):
                 continue
             bright = bright or brightness_of_gates(image)
             ring = fit_ring(fill_around(image, outline, MOST_PX, bright), outline)
-            if ring is None or any(sighting.colour != ring.colour for _, sighting in around):
-                continue
-            seen = self._ring_sighting(ring, image, chance)
-            if seen is not None:
-                found = [one for one in found if one not in around] + [seen]
+            sighting = None if ring is None else self._thin_sighting(ring, image)
+            if sighting is not None:
+                found.append(sighting)
         return found
 
-    def _ring_sighting(self, ring: Ring, image: Image, chance: float) -> _Found | None:
-        """The gate that a ring of lines is, if it is one; wide lines must be one by a greater chance."""
+    def _thin_sighting(self, ring: Ring, image: Image) -> _Found | None:
+        """The gate that a ring of thin lines is, if it is one."""
         height, width = image.shape[:2]
         middle = np.array([(width - 1) / 2, (height - 1) / 2])
         places = ring.corners - middle
@@ -187,8 +180,7 @@ class GateFinder:
         if best is None:
             return None
         distance_m = hypot(*best.poses[0].position_flu_m)
-        is_thin = self._focal_px * model.shape.bar_m <= _THIN_BAR_SHARE * width * distance_m
-        if not is_thin and chance <= _CERTAIN:
+        if self._focal_px * model.shape.bar_m > _THIN_BAR_SHARE * width * distance_m:
             return None
         box = _bounding_box(np.rint(ring.corners).astype(np.int32))
         return box, GateSighting(ring.colour, best.corners, best.whole, best.poses)
