@@ -113,8 +113,9 @@ class GateFinder:
         if seen is not None:
             chances, outlines = seen
             found = _likely(image, found, outlines)
-            known = [box for box, _ in found]
-            found += self._of_outlines(image, known, outlines[chances > _SURE])
+            known = [box for box, sighting in found if sighting.poses]
+            whole = self._of_outlines(image, known, outlines[chances > _SURE])
+            found = [one for one in found if one[1].poses or not _is_part(one, whole)] + whole
         edges = self._obstacle_edges(masks)
         height, width = image.shape[:2]
         by_colour = {c: [one for one in found if one[1].colour == c] for c in PRIMARIES}
@@ -237,6 +238,17 @@ def _is_inside(outline: Outline, box: _Box) -> bool:
     column, row, columns, rows = box
     x, y = outline.mean(axis=0).tolist()
     return bool(column <= x < column + columns and row <= y < row + rows)
+
+
+def _is_part(one: _Found, gates: Sequence[_Found]) -> bool:
+    """Whether what is seen of a gate is in the box of one of some gates of its colour."""
+    column, row, columns, rows = one[0]
+    return any(
+        gate.colour == one[1].colour
+        and left <= column + 0.5 * columns < left + width
+        and top <= row + 0.5 * rows < top + height
+        for (left, top, width, height), gate in gates
+    )
 
 
 def _is_worth_fitting(region: _Region, outlines: Outlines) -> bool:
