@@ -11,9 +11,7 @@ from firmware_py.control.design import design
 from framerunner.vehicle.airframe import load_airframe
 
 AIRFRAMES = ("abejorro", "racer-3in", "x500")
-KNOWING = (
-    "loop_inverse.py"  # inverts the abejorro's loops; `test_loop_inverse` holds its numbers to the firmware
-)
+KNOWING = "loop_inverse.py"  # inverts the abejorro's loops
 PERIOD_S = 0.004
 DIGITS = 3  # numbers of fewer digits are everybody's
 SAME = 5e-4  # share by which a rounded copy may differ

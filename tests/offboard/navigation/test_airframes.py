@@ -26,7 +26,7 @@ CONTACT_M = 0.065  # from an opening's centre: half its width less half the dron
 
 
 @pytest.mark.parametrize("airframe", AIRFRAMES, ids=lambda airframe: airframe.name)
-def test_any_airframe_comes_through_openings(airframe: Airframe):
+def test_an_airframe_comes_through_openings(airframe: Airframe):
     off_m = [each for seed in LAYOUTS for each in offsets(Layout.random(seed), airframe)]
     assert len(off_m) == 3 * len(LAYOUTS)
     assert max(off_m) < CONTACT_M
