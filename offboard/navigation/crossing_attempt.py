@@ -25,6 +25,7 @@ MAX_LOST_S = 1.5
 MAX_UNPLANNED_S = 2.0
 MAX_CROSSING_S = 25.0
 MORE_NEAR_S = 10.0  # for a drone that is near the opening already: it may not be able to stop before it
+SAME_GATE_M = 0.3  # what is certain no farther than this from the opening aimed at is that gate
 STUCK_M = 0.3  # a drone that is no farther from one place,
 MAX_STUCK_S = 6.0  # for so long, may hang on something that is not on the map
 
@@ -57,6 +58,7 @@ class CrossingAttempt:
     _across_m: float = 0.0
     _looking_since_s: float | None = None
     _passed_s: float = inf
+    _certain_m: Vec3 | None = None  # where the gate was when it was last certain
     _place_m: Vec3 | None = None  # where the drone has been near
     _there_since_s: float = 0.0
 
@@ -83,8 +85,10 @@ class CrossingAttempt:
         along_m, left_m = turned(dx, dy, -heading)
         if along_m >= 0.0 > self._along_m > -inf and not self.passed:
             opening_m = aim.gate.shape.opening_m
-            self.passed = abs(left_m) < opening_m[0] / 2 and abs(dz) < opening_m[1] / 2
-            self._refuse(f"passed its plane {hypot(left_m, dz):.2f} m from its centre")
+            inside = abs(left_m) < opening_m[0] / 2 and abs(dz) < opening_m[1] / 2
+            self.passed = inside and self._aims_at_certain_gate
+            why = "before it was certain" if inside else f"{hypot(left_m, dz):.2f} m from its centre"
+            self._refuse(f"passed its plane {why}")
             self._passed_s = now_s
         self._along_m, self._across_m = along_m, hypot(left_m, dz)
         clear_m = CLEAR_M + deeper_m(aim.gate.shape)
@@ -93,6 +97,12 @@ class CrossingAttempt:
     def _refuse(self, why: str) -> None:
         """Note why the attempt cannot go on; nothing can be refused behind the opening."""
         self.refusal = "" if self.passed else why
+
+    @property
+    def _aims_at_certain_gate(self) -> bool:
+        """The opening that the path leads through is of a gate that has been certain, not of another guess."""
+        aim, certain_m = self._aim, self._certain_m
+        return aim is not None and certain_m is not None and dist(aim.gate.centre_m, certain_m) < SAME_GATE_M
 
     def is_on(self, path: Path | None) -> bool:
         """Whether a path leads through the opening: not one to a place before it, to look."""
@@ -113,8 +123,8 @@ class CrossingAttempt:
 
     @property
     def is_committed(self) -> bool:
-        """The drone is straight before the opening, too near to plan again, or beyond it."""
-        if self._aim is None:
+        """The drone is straight before the opening of a certain gate, too near to plan again, or beyond it."""
+        if self._aim is None or not (self.passed or self._aims_at_certain_gate):
             return False
         shape = self._aim.gate.shape
         near = -COMMIT_M - deeper_m(shape) < self._along_m < 0.0
@@ -143,6 +153,8 @@ class CrossingAttempt:
             near_m: nearer to it, the drone must stop.
             now_s: vehicle time.
         """
+        if estimate.certain:
+            self._certain_m = estimate.position_m
         if estimate.certain or distance_m > near_m:
             self._looking_since_s = None
             return False

@@ -1,5 +1,9 @@
 """Why an attempt to cross a gate is given up."""
 
+from dataclasses import replace
+
+import pytest
+
 from framerunner.geometry.gate_shape import PAPER_GATE, GateShape
 from offboard.navigation.crossing_attempt import CrossingAttempt
 from offboard.navigation.goals import PathGate
@@ -7,10 +11,14 @@ from offboard.navigation.path import Crossing
 from offboard.navigation.view import GateEstimate
 
 UNSURE = GateEstimate("red", (2.0, 0.0, 1.0), 0.0, (0.1, 0.1, 0.1), 0.1, False, False, 3, 0)
+CERTAIN = replace(UNSURE, certain=True)
 
 
-def attempt():
-    return CrossingAttempt("red", 0.0, 0.0, 0.0)
+def attempt(known=None):
+    crossing = CrossingAttempt("red", 0.0, 0.0, 0.0)
+    if known is not None:
+        crossing.must_look(known, 2.0, 1.5, 0.0)
+    return crossing
 
 
 def test_each_reason_is_said():
@@ -46,7 +54,7 @@ def test_each_reason_is_said():
 
 def test_the_drone_must_be_nearer_to_the_axis_of_a_narrow_opening_before_it_commits():
     for shape, committed in ((PAPER_GATE, True), (GateShape(0.31, 0.2, 0.01, 0.01), False)):
-        crossing = attempt()
+        crossing = attempt(CERTAIN)
         crossing.aim(Crossing(PathGate((2.0, 0.0, 1.0), 0.0, shape), 0.0, 1.0))
         crossing.move((1.75, 0.04, 1.0), 1.0)
         assert crossing.is_committed is committed
@@ -55,8 +63,19 @@ def test_the_drone_must_be_nearer_to_the_axis_of_a_narrow_opening_before_it_comm
 def test_a_miss_is_refused_and_a_passage_is_not():
     missed, wide = "passed its plane 0.30 m from its centre", GateShape(outer_width_m=0.8)
     for left_m, shape, refusal in ((0.3, PAPER_GATE, missed), (0.05, PAPER_GATE, ""), (0.3, wide, "")):
-        crossing = attempt()
+        crossing = attempt(CERTAIN)
         crossing.aim(Crossing(PathGate((2.0, 0.0, 1.0), 0.0, shape), 0.0, 1.0))
         for x_m in (1.9, 2.1):
             crossing.move((x_m, left_m, 1.0), 1.0)
         assert (crossing.refusal, crossing.passed) == (refusal, not refusal)
+
+
+@pytest.mark.parametrize("known", [UNSURE, replace(CERTAIN, position_m=(4.0, 1.0, 1.0))])
+def test_a_guess_is_not_flown_through_as_a_gate(known):
+    """What the path leads through has never been certain, or what was certain is elsewhere."""
+    crossing = attempt(known)
+    crossing.aim(Crossing(PathGate((2.0, 0.0, 1.0), 0.0), 0.0, 1.0))
+    crossing.move((1.9, 0.0, 1.0), 1.0)
+    assert not crossing.is_committed
+    crossing.move((2.1, 0.0, 1.0), 1.1)
+    assert (crossing.refusal, crossing.passed) == ("passed its plane before it was certain", False)
