@@ -100,7 +100,7 @@ class CrossingAttempt:
 
     @property
     def _aims_at_certain_gate(self) -> bool:
-        """The opening that the path leads through is of a gate that has been certain, not of another guess."""
+        """The opening that the path leads through is of a gate that has been certain."""
         aim, certain_m = self._aim, self._certain_m
         return aim is not None and certain_m is not None and dist(aim.gate.centre_m, certain_m) < SAME_GATE_M
 
@@ -123,7 +123,7 @@ class CrossingAttempt:
 
     @property
     def is_committed(self) -> bool:
-        """The drone is straight before the opening of a certain gate, too near to plan again, or beyond it."""
+        """Straight before the opening of a certain gate, too near to plan again, or beyond it."""
         if self._aim is None or not (self.passed or self._aims_at_certain_gate):
             return False
         shape = self._aim.gate.shape
