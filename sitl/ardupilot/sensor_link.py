@@ -106,7 +106,7 @@ class FlowMean:
     """Makes OPTICAL_FLOW of samples that follow each other; what rounding leaves is added to the next one."""
 
     def __init__(self) -> None:
-        self._reset()
+        self._flow_rad, self._integrated_us, self._quality = (0.0, 0.0), 0, _MOST_QUALITY
         self._left = (0.0, 0.0)  # of `flow_x` and `flow_y`
 
     def add(self, sample: FlowSample) -> Message | None:
@@ -122,11 +122,8 @@ class FlowMean:
         x, y = (max(-_MOST_FLOW, min(round(value), _MOST_FLOW)) for value in exact)
         self._left = (exact[0] - x, exact[1] - y)
         quality = self._quality
-        self._reset()
-        return mavlink.MAVLink_optical_flow_message(sample.time_us, 0, x, y, 0.0, 0.0, quality, -1.0)
-
-    def _reset(self) -> None:
         self._flow_rad, self._integrated_us, self._quality = (0.0, 0.0), 0, _MOST_QUALITY
+        return mavlink.MAVLink_optical_flow_message(sample.time_us, 0, x, y, 0.0, 0.0, quality, -1.0)
 
 
 def _covariance(variances: tuple[float, ...]) -> tuple[float, ...]:

@@ -12,8 +12,9 @@ def test_flow_is_sent_ten_times_a_second_and_nothing_is_lost_by_rounding():
     sent = [message for sample in samples if (message := mean.add(sample)) is not None]
     assert len(sent) == 100
     period_s = FLOW_PERIOD_US * 1e-6
-    turned_rad = [FLOW_SCALE * period_s**2 * sum(flow) for flow in zip(*((m.flow_x, m.flow_y) for m in sent))]
-    assert turned_rad == pytest.approx((500 * 0.0011, -500 * 0.0023), abs=FLOW_SCALE * period_s**2)
+    unit_rad = FLOW_SCALE * period_s**2
+    turned_rad = (unit_rad * sum(m.flow_x for m in sent), unit_rad * sum(m.flow_y for m in sent))
+    assert turned_rad == pytest.approx((500 * 0.0011, -500 * 0.0023), abs=unit_rad)
 
 
 def test_a_mean_is_as_good_as_its_worst_sample():
