@@ -70,7 +70,9 @@ async def count_frames(folder: Path, steps: int) -> None:
     settings = ServerSettings(instance=INSTANCE, speed=SPEED)
     simulation = new_simulation()
     values = all_parameters(load_airframe("abejorro"), load_suite("mocap"))
-    process = ArduPilotProcess(find_build(folder), settings, simulation.place, values, None, takes_poses=True)
+    process = ArduPilotProcess(
+        find_build(folder), settings, simulation.place, values, None, takes_sensors=True
+    )
     server = ArduPilotServer(new_simulation, settings, AutopilotStart(process, ""), print)
     increments: Counter[int] = Counter()
     last, answer = 0, server.exchange.answer

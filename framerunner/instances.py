@@ -15,8 +15,8 @@ from framerunner.errors import SettingError
 from framerunner.wire.transports.sockets import bind_udp, listen_tcp
 from framerunner.wire.transports.urls import LinkError
 from sitl.ardupilot import json_interface as ardupilot
-from sitl.ardupilot.poses import POSE_PORT
 from sitl.ardupilot.relay import RELAY_PORT
+from sitl.ardupilot.sensor_link import SENSOR_PORT
 from sitl.px4 import link as px4
 from sitl.px4.side_link import CAMERA_PORT
 from sitl.server_settings import VIDEO_PORT
@@ -24,7 +24,7 @@ from sitl.server_settings import VIDEO_PORT
 INSTANCES = 10
 _TCP_PORTS = (px4.FIRST_PORT, VIDEO_PORT)
 _UDP_PORTS = (14280, 14540, 14580, 18570, CAMERA_PORT)  # of the app, and PX4's own
-_ARDUPILOT_UDP_PORTS = (ardupilot.FIRST_PORT, POSE_PORT, RELAY_PORT)
+_ARDUPILOT_UDP_PORTS = (ardupilot.FIRST_PORT, SENSOR_PORT, RELAY_PORT)
 _PX4_LOCKS = "/tmp/px4_lock-"  # PX4's own; an instance is one PX4's on this machine
 
 

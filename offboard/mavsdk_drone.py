@@ -193,7 +193,7 @@ class MavsdkDrone:
         steps = self._ticks.steps
         self._dialect = new = await open_dialect(system, self._direct, self._feed, room_m, stepped=steps)
         self._feed.subscribe(synchronous(self._telemetry), synchronous(self._direct), new.kind.numbered_modes)
-        self._inertial.subscribe(synchronous(self._direct))
+        self._inertial.subscribe(synchronous(self._direct), tells_accuracy=new.kind.tells_accuracy)
         if new.response_prior is not ResponsePrior.OWN:
             self._resets.subscribe(synchronous(self._direct))
         if self._place is not None:

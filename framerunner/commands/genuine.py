@@ -177,7 +177,7 @@ def _start_ardupilot(
     from sitl.sensors.suite import load_suite
 
     scenario, home = simulation.scenario, simulation.place
-    how = {"takes_poses": simulation.sends_poses, "relayed": relayed}
+    how = {"takes_sensors": simulation.sends_sensors, "relayed": relayed}
     values = all_parameters(simulation.world.airframe, load_suite(scenario.sensors))
     file = f"{simulation.world.airframe.name}.parm"
     command = (

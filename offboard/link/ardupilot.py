@@ -39,6 +39,7 @@ TAKEOFF_AGAIN_US = 5_000_000  # vehicle time; arming takes 2 s and the motors' s
 STREAMS_HZ = {
     mavlink.MAVLINK_MSG_ID_ATTITUDE: 50.0,
     mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 50.0,
+    mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: 200.0,  # it refuses more than 0.8 of its loop's rate, here 250 Hz
     mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 10.0,
     mavlink.MAVLINK_MSG_ID_SYS_STATUS: 2.0,
     mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: 1.0,
@@ -52,6 +53,7 @@ ARDUPILOT = AutopilotKind(
     ready_limit_s=90.0,  # its estimator uses GPS some 40 s after its start
     checks_in_offboard=True,
     numbered_modes=ardupilot_modes.NAMES,
+    tells_accuracy=False,
 )
 
 

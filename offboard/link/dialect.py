@@ -37,6 +37,7 @@ class AutopilotKind:
         ready_limit_s: wall time until it can be armed, usually.
         checks_in_offboard: its pre-arm checks are those of its mode, so it must enter offboard to be ready.
         numbered_modes: names by HEARTBEAT.custom_mode; empty: MAVSDK's names are used.
+        tells_accuracy: it sends how sure it is of its estimate (ODOMETRY).
     """
 
     name: str
@@ -47,6 +48,7 @@ class AutopilotKind:
     ready_limit_s: float
     checks_in_offboard: bool = False
     numbered_modes: Mapping[int, str] = field(default_factory=dict)
+    tells_accuracy: bool = True
 
 
 class TickExchange(Protocol):

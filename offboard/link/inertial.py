@@ -1,5 +1,8 @@
 """The vehicle's IMU samples (HIGHRES_IMU), and how sure it is of its own estimate (ODOMETRY).
 
+ArduPilot does not say how sure it is. When its SYS_STATUS names optical flow and neither GPS nor poses from
+outside, its position can only drift, and `BY_FLOW` is assumed.
+
 Samples count only if they come so often that they are means without gaps: PX4 sends one in four by itself, of
 which no motion can be integrated.
 """
@@ -26,6 +29,9 @@ ACCURACY_HZ = 10.0
 LONGEST_US = 12_000  # between two samples that are means without gaps; now and then one is lost
 SAMPLES_KEPT = 1000  # until they are taken
 MOST_M_S2, MOST_RAD_S = 1000.0, 100.0  # beyond what IMUs of drones can measure
+BY_FLOW = ReportedAccuracy(1.0, 0.1, 0.1, 0.1, 0.1)
+_FLOW = int(mavlink.MAV_SYS_STATUS_SENSOR_OPTICAL_FLOW)
+_POSITIONS = int(mavlink.MAV_SYS_STATUS_SENSOR_GPS) | int(mavlink.MAV_SYS_STATUS_SENSOR_VISION_POSITION)
 _ON_WIRE = Struct("<7f")  # a message that was not sent has double precision
 _X, _Y, _Z, _YAW = 0, 6, 11, 20  # of ODOMETRY's pose_covariance and velocity_covariance
 
@@ -44,10 +50,13 @@ class InertialFeed:
         self._usual_us = 0.0  # between two samples
         self._samples: deque[ImuInterval] = deque(maxlen=SAMPLES_KEPT)
 
-    def subscribe(self, direct: Any) -> None:  # noqa: ANN401 - MAVSDK is untyped
+    def subscribe(self, direct: Any, *, tells_accuracy: bool) -> None:  # noqa: ANN401 - MAVSDK is untyped
         """Subscribe to MAVSDK's synchronous plugin `mavlink_direct`."""
         subscribe(direct, "HIGHRES_IMU", self.take_imu)
-        subscribe(direct, "ODOMETRY", self.take_odometry)
+        if tells_accuracy:
+            subscribe(direct, "ODOMETRY", self.take_odometry)
+        else:
+            subscribe(direct, "SYS_STATUS", self.take_sensors)
 
     async def request(self, plugin: Any) -> None:  # noqa: ANN401
         """Request both, by MAVSDK's asyncio `telemetry`; a vehicle that refuses is flown as it reports.
@@ -104,6 +113,12 @@ class InertialFeed:
         if not self._odometry_order.is_next(message.time_usec):
             return
         self.accuracy = reported_accuracy(message) or self.accuracy
+
+    def take_sensors(self, message: Message) -> None:
+        """Take a SYS_STATUS of a vehicle that sends no accuracy."""
+        if message.get_srcComponent() == AUTOPILOT_COMPONENT_ID:
+            used = message.onboard_control_sensors_enabled
+            self.accuracy = BY_FLOW if used & _FLOW and not used & _POSITIONS else None
 
 
 def reported_accuracy(odometry: Message) -> ReportedAccuracy | None:

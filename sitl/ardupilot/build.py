@@ -9,8 +9,8 @@ from framerunner.errors import SettingError
 from framerunner.vehicle.geodesy import GeodeticPoint
 from sitl.ardupilot.json_interface import PORTS_AN_INSTANCE
 from sitl.ardupilot.parameters import file_of
-from sitl.ardupilot.poses import POSE_PORT
 from sitl.ardupilot.relay import RELAY_PORT
+from sitl.ardupilot.sensor_link import SENSOR_PORT
 from sitl.autopilots.parameters import Value
 from sitl.autopilots.process import AutopilotProcess
 from sitl.links import UdpAddresses
@@ -38,7 +38,12 @@ def find_build(folder: Path) -> Path:
 
 
 def options(
-    settings: ServerSettings, home: GeodeticPoint, defaults: str, *, takes_poses: bool, relayed: bool = False
+    settings: ServerSettings,
+    home: GeodeticPoint,
+    defaults: str,
+    *,
+    takes_sensors: bool,
+    relayed: bool = False,
 ) -> list[str]:
     """The options by which ArduCopter flies here, with MAVLink on this simulator's usual ports.
 
@@ -46,7 +51,7 @@ def options(
         settings: instance, ports and speed.
         home: the scenario's origin.
         defaults: file of parameters.
-        takes_poses: the simulator sends those of motion capture.
+        takes_sensors: the simulator sends those that come over MAVLink.
         relayed: MAVLink with the app goes through the simulator; see `sitl.ardupilot.relay`.
     """
     instance, here = settings.instance, f"udpclient:{settings.bind}"
@@ -57,7 +62,7 @@ def options(
         *("--home", f"{home.latitude_deg:.9f},{home.longitude_deg:.9f},{home.altitude_m:.3f},0"),
         *("--speedup", f"{settings.speed:g}", "--defaults", defaults),
         *("--serial0", app, "--serial1", _udp(settings.ground)),
-        *(("--serial2", f"{here}:{POSE_PORT + shift}") if takes_poses else ()),
+        *(("--serial2", f"{here}:{SENSOR_PORT + shift}") if takes_sensors else ()),
     ]
 
 
@@ -76,7 +81,7 @@ class ArduPilotProcess(AutopilotProcess):
         home: the scenario's origin.
         parameters: for its start; in a folder that is kept, those that were changed in flight win.
         folder: where it runs and keeps parameters and logs. None: a temporary one.
-        takes_poses: the simulator sends those of motion capture.
+        takes_sensors: the simulator sends those that come over MAVLink.
         relayed: MAVLink with the app goes through the simulator.
     """
 
@@ -88,17 +93,17 @@ class ArduPilotProcess(AutopilotProcess):
         parameters: dict[str, Value],
         folder: Path | None,
         *,
-        takes_poses: bool,
+        takes_sensors: bool,
         relayed: bool = False,
     ) -> None:
         super().__init__("ArduPilot", "--ardupilot", folder, {})
-        self._takes_poses, self._relayed = takes_poses, relayed
+        self._takes_sensors, self._relayed = takes_sensors, relayed
         self._program, self._settings, self._home = program, settings, home
         self._parameters = parameters
 
     def command(self) -> list[str]:
         """ArduCopter's own options."""
         (self.folder / PARAMETER_FILE).write_text(file_of(self._parameters), encoding="ascii")
-        how = {"takes_poses": self._takes_poses, "relayed": self._relayed}
+        how = {"takes_sensors": self._takes_sensors, "relayed": self._relayed}
         chosen = options(self._settings, self._home, PARAMETER_FILE, **how)
         return [str(self._program), *chosen]

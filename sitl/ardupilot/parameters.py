@@ -7,7 +7,8 @@ from math import sqrt
 from framerunner.errors import SettingError
 from framerunner.vehicle.airframe import Airframe
 from framerunner.wire.ardupilot_messages import EXTERNAL_NAVIGATION, POSE_ARRIVAL_EARLY_MS
-from sitl.ardupilot.simulation import PULSE_MAX_US, PULSE_MIN_US
+from sitl.ardupilot.sensor_link import FLOW_PERIOD_US, FLOW_SCALE
+from sitl.ardupilot.simulation import PULSE_MAX_US, PULSE_MIN_US, flies_by_flow
 from sitl.autopilots.parameters import Value, text_of
 from sitl.sensors.specs import SuiteSpec
 from sitl.world import PHYSICS_RATE_HZ
@@ -29,6 +30,9 @@ _SHARES_OF_BANDWIDTH = {  # each loop slower than the one inside it
 _YAW_BANDWIDTH_RAD_S = 4.0
 _YAW_INTEGRAL_SHARE = 0.1  # of P, by ArduCopter's defaults 0.18 and 0.018
 _POSE_NOISE_M, _POSE_NOISE_RAD = 0.02, 0.05
+_OPTICAL_FLOW = 5  # value of EK3_SRC1_VELXY
+_LEAST_FLOW_NOISE_RAD_S = 0.1  # beside white noise there are errors of scale and of the distance
+_MOST_FLOW_RAD_S = 4.0  # that the estimator's parameter allows
 _FACTOR = 0.5  # of each motor in roll, pitch and yaw, as ArduCopter normalises them
 _PLACES = ((1, 1), (-1, -1), (1, -1), (-1, 1))  # of rotors in X, as PX4 orders them: forward, right
 _FRAMES = (  # FRAME_TYPE, how the rotors turn, ArduCopter's motors at their places
@@ -80,7 +84,9 @@ def simulation_parameters() -> dict[str, Value]:
 
 
 def suite_parameters(suite: SuiteSpec) -> dict[str, Value]:
-    """What ArduPilot's estimator uses with a suite: the poses of motion capture, or its own simulated GPS."""
+    """What ArduPilot's estimator uses: poses of motion capture, optical flow, or its own simulated GPS."""
+    if flies_by_flow(suite):
+        return _flow_parameters(suite)
     pose = suite.external_pose
     if pose is None:
         return {
@@ -104,6 +110,36 @@ def suite_parameters(suite: SuiteSpec) -> dict[str, Value]:
         "COMPASS_ENABLE": 0,
         "MAV3_OPTIONS": 2,  # poses are not forwarded to the other links
     }
+
+
+def _flow_parameters(suite: SuiteSpec) -> dict[str, Value]:
+    flow, range_finder = suite.optical_flow, suite.range_finder
+    assert flow is not None, "it flies by it"
+    values: dict[str, Value] = {
+        "FLOW_TYPE": 5,  # MAVLink
+        "FLOW_FXSCALER": round(1000 * (FLOW_SCALE - 1)),
+        "FLOW_FYSCALER": round(1000 * (FLOW_SCALE - 1)),
+        "EK3_FLOW_DELAY": 0,
+        "EK3_FLOW_M_NSE": max(
+            _LEAST_FLOW_NOISE_RAD_S, flow.noise_rad_s / sqrt(FLOW_PERIOD_US * 1e-6 * flow.rate_hz)
+        ),
+        "EK3_MAX_FLOW": min(_MOST_FLOW_RAD_S, flow.max_flow_rad_s),
+        "EK3_SRC1_POSXY": 0,
+        "EK3_SRC1_VELXY": _OPTICAL_FLOW,
+        "EK3_SRC1_VELZ": 0,
+        "GPS1_TYPE": 0,
+        "MAV3_OPTIONS": 2,  # flow is not forwarded to the other links
+    }
+    if range_finder is not None:
+        values |= {
+            "RNGFND1_TYPE": 100,  # of the JSON interface
+            "RNGFND1_ORIENT": 25,  # down
+            "RNGFND1_MIN": range_finder.min_distance_m,
+            "RNGFND1_MAX": range_finder.max_distance_m,
+            "EK3_RNG_M_NSE": 0.01,  # a variance, m²; with 0.5 the ground beside a base counts after seconds
+            "EK3_TERR_GRAD": 0.2,  # likewise
+        }
+    return values
 
 
 def flight_parameters() -> dict[str, Value]:

@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 from framerunner.wire.transports.sockets import Address, UdpSocket, bind_udp
 from sitl.ardupilot.json_interface import FIRST_PORT, PORTS_AN_INSTANCE, ServoFrame, decode_frame
-from sitl.ardupilot.poses import POSE_PORT, PoseLink
 from sitl.ardupilot.relay import HEARTBEAT_S, RELAY_PORT, AppRelay
+from sitl.ardupilot.sensor_link import SENSOR_PORT, SensorLink
 from sitl.ardupilot.simulation import ArduPilotSimulation
 from sitl.ardupilot.sole_sender import SoleSender, mavlink_sender
 from sitl.autopilots.process import AutopilotEndedError
@@ -83,7 +83,7 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
 
     exchange: FrameExchange
     _link: UdpSocket | None = None
-    _poses: PoseLink | None = None
+    _sensors: SensorLink | None = None
     _relay: AppRelay | None = None  # with a program that grants time
     _pacer: Pacer | None = None  # until that has granted time
     _sender: SoleSender[ServoFrame]
@@ -100,10 +100,10 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         bind, instance = self._settings.bind, self._settings.instance
         self._link = bind_udp((bind, self._port), "choose another --instance")
         self._opened.callback(self._link.close)
-        if self._simulation.sends_poses:
-            port, place = POSE_PORT + PORTS_AN_INSTANCE * instance, self._simulation.place
-            self._poses = PoseLink(bind, port, instance + 1, place, self._notice)
-            self._opened.callback(self._poses.close)
+        if self._simulation.sends_sensors:
+            port, place = SENSOR_PORT + PORTS_AN_INSTANCE * instance, self._simulation.place
+            self._sensors = SensorLink(bind, port, instance + 1, place, self._notice)
+            self._opened.callback(self._sensors.close)
         app = self._settings.onboard.remote
         if self._grants is not None and app is not None:
             port = RELAY_PORT + PORTS_AN_INSTANCE * instance
@@ -194,8 +194,11 @@ class ArduPilotServer(AutopilotServer[ArduPilotSimulation]):
         line = self.exchange.answer(frame)
         if line is None:
             return
-        if is_new and simulation.pose is not None and self._poses is not None:
-            self._poses.send(simulation.pose)  # before the answer that lets ArduPilot's time advance
+        if is_new and self._sensors is not None:  # before the answer that lets ArduPilot's time advance
+            if simulation.pose is not None:
+                self._sensors.send_pose(simulation.pose)
+            if simulation.flow is not None:
+                self._sensors.send_flow(simulation.flow)
         if holds and self._relay is not None:
             self._relay.flush()
         self._link.write(line, peer)

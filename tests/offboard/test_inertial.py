@@ -9,9 +9,9 @@ from offboard.link.inertial import InertialFeed
 
 
 class Vehicle:
-    def __init__(self):
+    def __init__(self, *, tells_accuracy=True):
         self.feed, self.take = InertialFeed(), {}
-        self.feed.subscribe(self)
+        self.feed.subscribe(self, tells_accuracy=tells_accuracy)
 
     def subscribe_message(self, name, callback):
         self.take[name] = callback
@@ -86,3 +86,11 @@ def test_the_accuracy_is_the_worse_of_two_axes_and_none_if_the_vehicle_does_not_
     assert (accuracy.position_std_m, accuracy.height_std_m) == pytest.approx((0.02, 0.1))
     assert (accuracy.velocity_std_m_s, accuracy.climb_std_m_s) == pytest.approx((0.04, 0.05))
     assert (accuracy.heading_std_rad, accuracy.resets) == (pytest.approx(0.03), 3)
+
+
+@pytest.mark.parametrize(("used", "drifts"), [(0x40, True), (0x60, False), (0xC0, False), (0x0, False)])
+def test_a_vehicle_that_tells_no_accuracy_drifts_with_flow_alone(used, drifts):
+    vehicle = Vehicle(tells_accuracy=False)
+    vehicle.samples(range(4_000, 104_000, 4_000))
+    vehicle.send("SYS_STATUS", onboard_control_sensors_enabled=used)
+    assert vehicle.feed.drifts == drifts

@@ -20,7 +20,7 @@ async def test_all_streams_are_requested_before_time_goes_on():
     plugin.result = mavlink.MAV_RESULT_FAILED  # what is refused is missing later
     answer = dialect.request_streams()
     assert {fields["command"] for _, fields in plugin.sent} == {mavlink.MAV_CMD_SET_MESSAGE_INTERVAL}
-    assert len({fields["param1"] for _, fields in plugin.sent}) == 5
+    assert len({fields["param1"] for _, fields in plugin.sent}) == 6
     await answer
 
 

@@ -105,9 +105,12 @@ def test_the_same_pulses_make_the_same_lines():
     assert lines() == lines()
 
 
-def test_a_range_finder_out_of_its_range_sends_a_number():
+def test_a_range_finder_too_near_to_measure_sends_its_shortest_distance_until_it_has_measured():
     simulation = ArduPilotSimulation(load_scenario("test-case-1").model_copy(update={"sensors": "outdoor"}))
-    lines = [simulation.step((1000,) * 16) for _ in range(100)]  # on the ground, nearer than it measures
+    lines = [simulation.step((1000,) * 16) for _ in range(100)]
+    assert b'"rng_1":0.1000}' in lines[-1]
+    lines += [simulation.step((1400,) * 16) for _ in range(800)]  # it climbs
+    lines += [simulation.step((1010,) * 16) for _ in range(1500)]  # armed, and on the ground again
     assert b'"rng_1":-1.0000}' in lines[-1]
     assert not any(b"nan" in line for line in lines)
 

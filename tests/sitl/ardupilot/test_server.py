@@ -16,7 +16,7 @@ from framerunner.wire.framing import PacketReader
 from scenarios.loader import load_scenario
 from sitl.ardupilot.build import ArduPilotProcess, find_build
 from sitl.ardupilot.json_interface import FIRST_PORT, PORTS_AN_INSTANCE
-from sitl.ardupilot.poses import POSE_PORT
+from sitl.ardupilot.sensor_link import SENSOR_PORT
 from sitl.ardupilot.server import ArduPilotServer
 from sitl.ardupilot.simulation import ArduPilotSimulation
 from sitl.autopilots.process import AutopilotEndedError, AutopilotStart
@@ -136,7 +136,7 @@ async def test_poses_of_motion_capture_and_the_origin_are_sent_by_mavlink():
     async with serving(sensors="mocap") as (fake, _lines, _made):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as serial:
             serial.settimeout(5.0)
-            port = POSE_PORT + fake.place[1] - FIRST_PORT
+            port = SENSOR_PORT + fake.place[1] - FIRST_PORT
             beat = mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, 3, 3)
             system_id = 1 + (fake.place[1] - FIRST_PORT) // PORTS_AN_INSTANCE
             link = mavlink.MAVLink(None, srcSystem=system_id, srcComponent=1)
@@ -188,7 +188,7 @@ def fake_process(tmp_path, instance):
     program.chmod(0o755)
     settings, home = ServerSettings(instance=instance), GeodeticPoint(47.0, 8.0, 400.0)
     options = (find_build(tmp_path), settings, home, {}, tmp_path / "files")
-    return ArduPilotProcess(*options, takes_poses=False)
+    return ArduPilotProcess(*options, takes_sensors=False)
 
 
 def child_of(process):
