@@ -28,7 +28,7 @@ _BETTER = 0.7  # share of the present pair's error that another one must reach
 _UNEXPLAINED = 0.08  # root mean square of the changes (m/s, rad/s) that other things than lateness make
 _DISTURBANCE_S = 0.2  # time constant of the estimate of what commands do not explain
 _WASHED_S = 0.4  # time constant with which a vehicle's integral takes over what a cause makes
-_CAUSE_PRIOR = (-0.12, 0.2)  # of the rate by a unit of the cause: mean, standard deviation
+_CAUSE_PRIOR = 0.3  # standard deviation of the rate by a unit of the cause
 _CAUSE_NOISE = 0.07  # of the rate
 _LEAD = 0.7  # share by which its change is expected to go on: heights wander slowly
 
@@ -62,7 +62,7 @@ class RateResponse:
         self._kept = np.array([exp(-STEP_S / lag_s) for lag_s in LAGS_S])
         self._errors = np.zeros((len(DEAD_STEPS), len(LAGS_S)))
         self._energy = self._time_s = 0.0
-        self._by_cause, self._by_cause_variance = _CAUSE_PRIOR[0], _CAUSE_PRIOR[1] ** 2
+        self._by_cause, self._by_cause_variance = 0.0, _CAUSE_PRIOR**2
         self.restart()
 
     def restart(self) -> None:

@@ -113,7 +113,7 @@ def test_height_is_kept_where_a_fast_drone_changes_its_tilt():
         state = drone.next_state()
         if state.z > 2.05:
             off_m.append(abs(state.z - path.at(follower.progress_s).position_m[2]))
-    assert max(off_m) < 0.05  # before it is known how far drag along the thrust disturbs the climb
+    assert max(off_m) < 0.07  # before it is known how far drag along the thrust disturbs the climb
 
 
 def test_drone_that_brakes_and_turns_stops_on_its_path():
