@@ -51,7 +51,9 @@ _STATES = 10  # coefficients, and the trims of both axes
 # Of multicopters of any size, as in `TiltLoop`: they accelerate by 2 to 6 1/s of the velocity's error.
 _PRIOR = np.array((0.05, 0.08, 0.004, 0.3, 0.4, 0.3, 0.5, 0.6, 0.0, 0.0))
 _PRIOR_STD = np.array((0.06, 0.1, 0.003, 0.15, 0.15, 0.35, 0.8, 0.4, 0.05, 0.05))
-_WANDER = np.array((0.001, 0.003, 0.0001, 0.003, 0.003, 0.003, 0.01, 0.005, 0.003, 0.003)) ** 2 * STEP_S
+# By the root of a second. Trims wander as a vehicle tilts against gusts by itself: taken for steady, they
+# would make the coefficients, and with them dead times, explain gusts.
+_WANDER = np.array((0.001, 0.003, 0.0001, 0.003, 0.003, 0.003, 0.01, 0.005, 0.03, 0.03)) ** 2 * STEP_S
 _LAGGED_COST = 8.0  # of a first lag, in log likelihood
 _DEAD_COST = 0.125  # likewise of each quarter step beside the usual dead time
 _USUAL_DEAD = 3
