@@ -80,10 +80,10 @@ class GateLandmarks:
         for number, (view, eye) in enumerate(seen):
             distance2 = place.distance2(_corners(place, colour, view, eye))
             if distance2 is not None:
-                fits.append((distance2 / CHI_SQUARED[sum(view.seen)], number))
+                fits.append((distance2 / CHI_SQUARED[sum(view.seen)], distance2, number))
         if not fits:
             return
-        share, number = min(fits)
+        share, distance2, number = min(fits)
         view, eye = seen[number]
         if share <= GATE_FACTOR:
             used = self._used[colour]
@@ -91,7 +91,9 @@ class GateLandmarks:
                 self._contradicted[colour] = 0
                 return
             most2 = GATE_FACTOR * CHI_SQUARED[sum(view.seen)]  # also where it leads to, which may be far away
-            if place.update(_corners(place, colour, view, eye), most2):
+            worse = max(1.0, distance2 / len(view.corners_px))  # farther off than its noise says: it has more
+            noisy = replace(view, noise_px2=worse * view.noise_px2)
+            if place.update(_corners(place, colour, noisy, eye), most2):
                 self._contradicted[colour], self._used[colour] = 0, view
                 if colour in self.unsized:
                     self._compare_size(place, colour)
@@ -196,4 +198,4 @@ def _corners(place: PlaceFilter, colour: str, view: GateView, eye: Eye) -> Model
     """A view of a gate in the filter as a measurement."""
     first = place.gates[colour]
     yaw_var_rad2 = float(place.p[first + 3, first + 3])
-    return corners(view, eye, first, place.seen_from_m[colour], yaw_var_rad2)
+    return corners(view, eye, first, yaw_var_rad2)

@@ -15,7 +15,7 @@ from framerunner.geometry.vectors import Quaternion, Vec3
 from offboard.navigation.camera_model import NEAREST_M, CameraModel
 from offboard.navigation.gates.gate_measurement import GateView, predicted
 from offboard.navigation.pose_history import turned_by
-from offboard.place.place_filter import OWN, POSE, POSITION, SIZE, TURN, Floats, Measurement, Model
+from offboard.place.place_filter import OWN, POSE, POSITION, SEEN_FROM, SIZE, TURN, Floats, Measurement, Model
 
 PLACE_STD_M = 0.0005  # of the camera on the drone
 
@@ -134,7 +134,7 @@ class Eye:
         return seen is not None and self.model.contains(*seen, 0.0)
 
 
-def corners(view: GateView, eye: Eye, first: int, seen_from_m: Floats, yaw_var_rad2: float) -> Model:
+def corners(view: GateView, eye: Eye, first: int, yaw_var_rad2: float) -> Model:
     """The corners of a gate in an image.
 
     One larger than its shape looks like one that is nearer, and moves along with the drone. The linear
@@ -144,7 +144,6 @@ def corners(view: GateView, eye: Eye, first: int, seen_from_m: Floats, yaw_var_r
         view: what was seen.
         eye: from where.
         first: index of the gate in the state.
-        seen_from_m: see `PlaceFilter`.
         yaw_var_rad2: variance of the gate's yaw.
     """
 
@@ -152,7 +151,8 @@ def corners(view: GateView, eye: Eye, first: int, seen_from_m: Floats, yaw_var_r
         place_m, attitude = eye.place(state)
         camera = eye.model.pose(place_m, attitude)
         gate = state[first : first + POSE].copy()
-        kept, since_m = exp(-float(state[first + SIZE])), place_m - seen_from_m
+        seen_from = slice(first + SEEN_FROM.start, first + SEEN_FROM.stop)
+        kept, since_m = exp(-float(state[first + SIZE])), place_m - state[seen_from]
         gate[:3] += (1.0 - kept) * since_m
         expected = predicted(gate, replace(view, camera=camera))
         if expected is None:
@@ -162,6 +162,7 @@ def corners(view: GateView, eye: Eye, first: int, seen_from_m: Floats, yaw_var_r
         jacobian = np.zeros((len(corners_px), len(state)))
         jacobian[:, first : first + POSE] = by_gate
         jacobian[:, first + SIZE] = kept * moved @ since_m
+        jacobian[:, seen_from] = (kept - 1.0) * moved
         jacobian[:, POSITION] = -kept * moved
         x, y, _ = gate[:3] - place_m + kept * (place_m - state[POSITION])
         jacobian[:, TURN] = moved @ (y, -x, 0.0) - by_gate[:, 3]

@@ -1,8 +1,8 @@
 """The filter of the drone's place: an extended Kalman filter over the drone and the gates that it has seen.
 
 The state is the drone's position and velocity in the arena, the angle by which its reported heading is wrong,
-the accelerometer's bias, and for each gate x, y, z, yaw and size: simultaneous localisation and mapping
-(Durrant-Whyte & Bailey, IEEE Robotics & Automation Magazine 13(2), 2006). Roll and pitch are taken as
+the accelerometer's bias, and for each gate x, y, z, yaw, size and from where it was seen first: simultaneous
+localisation and mapping (Durrant-Whyte & Bailey, IEEE Robotics & Automation Magazine 13(2), 2006). Roll and pitch are taken as
 reported: the vehicle's own filter knows them by gravity to a fraction of a degree, and what is left acts like
 a bias.
 """
@@ -25,7 +25,8 @@ Floats: TypeAlias = npt.NDArray[np.float64]
 
 POSITION, TURN, VELOCITY, BIAS, OWN = slice(0, 3), 3, slice(4, 7), slice(7, 10), 10
 POSE = 4  # numbers of a place: x, y, z and heading; those of the drone come first
-SIZE, GATE = 4, 5  # of a gate: the logarithm of its size over that of its shape; numbers in all
+# Of a gate: the logarithm of its size over that of its shape, from where it was seen first, numbers in all.
+SIZE, SEEN_FROM, GATE = 4, slice(5, 8), 8
 
 # Noise, as densities and random walks per root of a second: of a small IMU on a vibrating drone, whose
 # reported roll and pitch are wrong by tenths of a degree.
@@ -80,11 +81,11 @@ class PlaceFilter:
 
     Attributes:
         time_us: of the state.
-        x: the state, shape (10 + 5 gates,).
+        x: the state, shape (10 + 8 gates + 4 clones,).
         p: its covariance.
         gates: the first index of each gate, by colour. Its place is where one of the size of its shape would
-            be, as seen from where it was seen first: that place is known, whatever its size.
-        seen_from_m: that place of the drone, by colour.
+            be, as seen from where it was seen first: that place is known, whatever its size. Where that was is
+            known no better than the drone's place then, so it is part of the state.
         clones: the first index of where the drone was, by some times.
     """
 
@@ -102,7 +103,6 @@ class PlaceFilter:
         stds = [position_std_m] * 3 + [START_TURN_RAD] + [velocity_std_m_s] * 3 + [START_BIAS_M_S2] * 3
         self.p = np.diag(np.square(stds))
         self.gates: dict[str, int] = {}
-        self.seen_from_m: dict[str, Floats] = {}
         self.clones: dict[int, int] = {}
 
     @property
@@ -200,6 +200,10 @@ class PlaceFilter:
             x, y, _ = self.x[at : at + 3] - self.x[POSITION]
             common[at : at + POSE] = np.eye(POSE)
             common[at : at + 2, TURN] = (-y, x)
+        for at in (first + SEEN_FROM.start for first in self.gates.values()):
+            x, y, _ = self.x[at : at + 3] - self.x[POSITION]
+            common[at : at + 3, POSITION] = np.eye(3)
+            common[at : at + 2, TURN] = (-y, x)
         self.p += common * np.square((*std_m, heading_std_rad)) @ common.T
 
     def distance2(self, model: Model) -> float | None:
@@ -259,16 +263,16 @@ class PlaceFilter:
             size_std: standard deviation of the logarithm of its size.
         """
         n = len(self.x)
-        noise = np.diag((0.0, 0.0, 0.0, 0.0, size_std**2))
-        noise[:POSE, :POSE] = covariance
-        self.seen_from_m[colour] = self.x[POSITION].copy()
+        noise = np.zeros((GATE, GATE))
+        noise[:POSE, :POSE], noise[SIZE, SIZE] = covariance, size_std**2
         x, y, _ = state[:3] - self.x[POSITION]
         j = np.zeros((GATE, n))
         j[:3, POSITION] = np.eye(3)
         j[:POSE, TURN] = (-y, x, 0.0, 1.0)
+        j[SEEN_FROM, POSITION] = np.eye(3)
         across = j @ self.p
         self.p = np.block([[self.p, across.T], [across, across @ j.T + noise]])
-        self.x = np.concatenate((self.x, state, (0.0,)))
+        self.x = np.concatenate((self.x, state, (0.0,), self.x[POSITION]))
         self.gates[colour] = n
 
     def drop_gate(self, colour: str) -> None:
