@@ -2,9 +2,9 @@
 
 The state is the drone's position and velocity in the arena, the angle by which its reported heading is wrong,
 the accelerometer's bias, and for each gate x, y, z, yaw, size and from where it was seen first: simultaneous
-localisation and mapping (Durrant-Whyte & Bailey, IEEE Robotics & Automation Magazine 13(2), 2006). Roll and pitch are taken as
-reported: the vehicle's own filter knows them by gravity to a fraction of a degree, and what is left acts like
-a bias.
+localisation and mapping (Durrant-Whyte & Bailey, IEEE Robotics & Automation Magazine 13(2), 2006). Roll and
+pitch are taken as reported: the vehicle's own filter knows them by gravity to a fraction of a degree, and
+what is left acts like a bias.
 """
 
 from __future__ import annotations
@@ -84,8 +84,8 @@ class PlaceFilter:
         x: the state, shape (10 + 8 gates + 4 clones,).
         p: its covariance.
         gates: the first index of each gate, by colour. Its place is where one of the size of its shape would
-            be, as seen from where it was seen first: that place is known, whatever its size. Where that was is
-            known no better than the drone's place then, so it is part of the state.
+            be, as seen from where it was seen first: that place is known, whatever its size. Where that was
+            is known as well as the drone's place then, so it is part of the state.
         clones: the first index of where the drone was, by some times.
     """
 

@@ -182,11 +182,14 @@ def test_a_gate_is_where_it_is_seen_from_the_drone_though_both_have_drifted():
 
 
 def test_what_the_vehicle_reports_too_much_of_its_velocity_is_told():
-    vehicle = Vehicle(1)
-    vehicle.state = constant_error(vehicle, (0.12, 0.0, 0.0))
-    _, world = fly(vehicle)
-    forward, left, _ = world.localization.velocity_error_flu_m_s
-    assert hypot(forward, left) == pytest.approx(0.12, abs=0.04)
+    told = []
+    for seed in (1, 2, 3):
+        vehicle = Vehicle(seed)
+        vehicle.state = constant_error(vehicle, (0.12, 0.0, 0.0))
+        _, world = fly(vehicle)
+        forward, left, _ = world.localization.velocity_error_flu_m_s
+        told.append(hypot(forward, left))
+    assert np.mean(told) == pytest.approx(0.12, abs=0.04)
 
 
 def constant_error(vehicle, wrong_m_s):
@@ -320,7 +323,10 @@ def test_away_from_a_gate_flight_comes_back_to_the_arena_after_a_correction():
 
 
 def test_a_picture_of_a_gate_that_is_larger_than_one_is_not_believed_to_be_one():
-    """If it were, the drone's place would be wrong by 22 stated deviations in each of these flights."""
+    """If it were, the drone's place would be wrong by 22 stated deviations in each of these flights.
+
+    Were the place from where it was seen first known exactly, it would be 7 in the mean.
+    """
     larger, worst = {"outer_width_m": 1.5 * RED.outer_width_m, "outer_height_m": 1.5 * RED.outer_height_m}, []
     for seed in (31, 32, 33):
         states, world = fly(Vehicle(seed), gates=lambda _: (RED.model_copy(update=larger),))
@@ -328,7 +334,29 @@ def test_a_picture_of_a_gate_that_is_larger_than_one_is_not_believed_to_be_one()
         worst.append(float((np.abs(errors(states)).max(axis=1) / stated).max()))
         gate = world.gate("red")
         assert gate is None or not gate.certain
-    assert np.mean(worst) < 12.0
+    assert np.mean(worst) < 5.0
+
+
+class Squeezed(Vehicle):
+    """A vehicle whose images show gates lower than they are for a while, as nearly edge-on ones are found."""
+
+    def image(self, time_us, gates):
+        image = super().image(time_us, gates)
+        if not 8.0 < time_us * 1e-6 < 11.0:
+            return image
+        frames = []
+        for gate in image.frames:
+            by_px = (2.5, 0.8, -2.5, -0.8)
+            corners = zip(gate.corners, by_px, strict=True)
+            found = tuple(replace(corner, down_px=corner.down_px + px) for corner, px in corners)
+            frames.append(replace(gate, corners=found))
+        return replace(image, frames=tuple(frames))
+
+
+def test_views_that_are_farther_off_than_they_state_do_not_drag_the_drone_along():
+    """If they were used with the noise that they state, it would be 0.45 m off in each of these flights."""
+    worst = [np.abs(errors(fly(Squeezed(seed), 12.0)[0])[-60:]).max() for seed in range(3)]
+    assert np.mean(worst) < 0.2
 
 
 def test_a_gate_by_the_arena_s_side_has_room_if_the_place_may_be_off_by_what_lacks():

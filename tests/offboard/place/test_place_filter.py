@@ -22,8 +22,8 @@ CAMERA = CameraModel.of(Camera())
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 EYE = Eye(CAMERA, quaternion_from_euler(0.1, -0.05, 0.4), (0.02, -0.01, 0.03))
 BASE_M = np.array(((2.1, 0.4, 0.5), (2.1, 0.9, 0.5), (1.8, 0.2, 0.0)))
-SEEN_FROM_M = np.array((-0.6, 0.1, 1.0))
-STATE = np.array((0.1, -0.3, 1.2, 0.05, 0.5, -0.2, 0.1, 0.02, -0.01, 0.03, 2.1, 0.9, 1.4, 0.7, 0.15))
+OF_DRONE = (0.1, -0.3, 1.2, 0.05, 0.5, -0.2, 0.1, 0.02, -0.01, 0.03)
+STATE = np.array((*OF_DRONE, 2.1, 0.9, 1.4, 0.7, 0.15, -0.6, 0.1, 1.0))
 
 
 def tilted(time_s):
@@ -119,8 +119,8 @@ def view(seen=(True, True, True, True)):
             (0.6, -0.1, 0.2), 0.1, 0.05, position_m=(0.2, 0.1, 1.3), height_std_m=0.05, position_std_m=0.01
         ),
         stands((0.2, 0.1, 1.0), 0.1, 0.01, 0.01, 0.01),
-        corners(view(), EYE, OWN, SEEN_FROM_M, 0.0),
-        corners(view((True, False, False, True)), EYE, OWN, SEEN_FROM_M, 0.0),
+        corners(view(), EYE, OWN, 0.0),
+        corners(view((True, False, False, True)), EYE, OWN, 0.0),
         size(OWN, 0.1),
         points(BASE_M, np.array(((5.0, 60.0), (-40.0, 55.0), (20.0, 70.0))), np.eye(6), EYE, 0.003),
     ],
@@ -210,30 +210,33 @@ def test_a_doubted_place_is_known_as_well_as_before_relative_to_the_gates():
     assert place.p[OWN, OWN] > gate_m + 0.25
 
 
+def see_from(place, true_m, larger=1.0):
+    """Bring the filter to a place with an error of 5 cm, and show it a gate there."""
+    place.displace(0, tuple(np.array(true_m) - place.x[:3]), 0.05, 0.0)
+    camera = CAMERA.pose(true_m, LEVEL)
+    shape = GateShape(larger * PAPER_GATE.outer_width_m, larger * PAPER_GATE.outer_height_m)
+    looks = replace(view(), shape=shape, camera=camera, noise_px2=0.25 * np.eye(8))
+    expected = predicted(np.array((2.1, 0.9, 1.4, 0.3)), looks)
+    shown = replace(looks, shape=PAPER_GATE, corners_px=expected[0])
+    for _ in range(5):
+        place.update(corners(shown, Eye(CAMERA, LEVEL, (0.0, 0.0, 0.0)), OWN, 0.0))
+
+
 def test_a_gate_is_known_as_well_far_from_where_it_was_seen_first_once_its_size_is_known():
     place = PlaceFilter(0, (-6.0, 0.1, 1.2), (0.0, 0.0, 0.0))
     place.add_gate("red", np.array((2.1, 0.9, 1.4, 0.3)), 1e-2 * np.eye(4), SIZE_STD)
     for true_m in ((-6.0, 0.1, 1.2), (-3.0, -1.0, 1.3), (1.0, 0.4, 1.4)):
-        place.displace(0, tuple(np.array(true_m) - place.x[:3]), 0.05, 0.0)
-        camera = CAMERA.pose(true_m, LEVEL)
-        view = GateView(
-            "red",
-            PAPER_GATE,
-            True,
-            0,
-            camera,
-            CAMERA.focal_px,
-            (True,) * 4,
-            np.zeros(8),
-            0.25 * np.eye(8),
-            0.0,
-        )
-        expected = predicted(np.array((2.1, 0.9, 1.4, 0.3)), view)
-        for _ in range(5):
-            shown = replace(view, corners_px=expected[0])
-            model = corners(shown, Eye(CAMERA, LEVEL, (0.0, 0.0, 0.0)), OWN, place.seen_from_m["red"], 0.0)
-            place.update(model)
+        see_from(place, true_m)
         if true_m[0] == -3.0:
             place.update(size(OWN, GATE_SIZE_STD))
     x, y, z, _ = np.sqrt(place.gate_from_drone("red").diagonal()).tolist()
     assert max(x, y, z) < CERTAIN_M
+
+
+def test_a_gate_of_another_size_does_not_tell_where_the_drone_is_in_the_arena():
+    place = PlaceFilter(0, (-2.0, 0.1, 1.2), (0.0, 0.0, 0.0), position_std_m=0.3)
+    place.add_gate("red", np.array((0.7, 0.6, 1.3, 0.3)), 1e-1 * np.eye(4), SIZE_STD)
+    for true_m in ((-2.0, 0.1, 1.2), (-1.6, -0.3, 1.3), (-1.2, 0.3, 1.4), (-1.0, -0.2, 1.2)):
+        see_from(place, true_m, larger=1.5)
+    assert place.size("red")[1] < 0.1  # it has shown its size
+    assert np.sqrt(place.p.diagonal()[:3]).min() > 0.29
