@@ -254,9 +254,11 @@ def inset_outline(points: Floats) -> Ints | None:
     Args:
         points: its corners in sixteenths of a pixel, shape (k, 2).
     """
-    following = np.roll(np.arange(len(points)), -1)
+    last = np.arange(-1, len(points) - 1)
+    following = last + 2
+    following[-1] = 0
     moved = np.ones(len(points), np.bool_)
-    inset, is_wide = _inset(points.T, following, np.argsort(following), np.zeros(1, np.intp), moved)
+    inset, is_wide = _inset(points.T, following, last, np.zeros(1, np.intp), moved)
     return np.rint(inset).T.astype(np.int32, order="C") if is_wide[0] else None
 
 

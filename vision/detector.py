@@ -20,6 +20,7 @@ from __future__ import annotations
 from math import acos, degrees, hypot
 
 import cv2
+import numpy as np
 
 from framerunner.geometry.gate_shape import PAPER_GATE, GateShape, GateShapes
 from vision.colour_regions import Plane, find_primaries, half_filled, split_planes
@@ -106,11 +107,14 @@ def _find(
     # Saturating subtraction keeps every difference in uint8; a pixel stays non-zero where a test passes.
     excess = cv2.subtract(shown, following)
     _, mask = cv2.threshold(excess, MIN_EXCESS, 255, cv2.THRESH_BINARY)
-    if cv2.countNonZero(mask):
-        gap = cv2.absdiff(following, other)
+    column, row, columns, rows = cv2.boundingRect(mask)
+    if rows:
+        # With the pixels beside them, which the test for half filled ones compares them with.
+        part = np.s_[max(row - 1, 0) : row + rows + 1, max(column - 1, 0) : column + columns + 1]
+        gap = cv2.absdiff(following[part], other[part])
         _, grey = cv2.threshold(gap, MAX_GREY_GAP - 1, 255, cv2.THRESH_BINARY_INV, dst=gap)
-        cv2.bitwise_and(mask, grey, dst=mask)
-        cv2.bitwise_and(mask, half_filled(excess), dst=mask)
+        passed = cv2.bitwise_and(grey, half_filled(excess[part]))
+        cv2.bitwise_and(mask[part], passed, dst=mask[part])
     if line is not None:
         cv2.bitwise_or(mask, line, dst=mask)
     column, row, columns, rows = cv2.boundingRect(mask)

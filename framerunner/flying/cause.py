@@ -81,12 +81,12 @@ class CauseWatch:
         found: list[GateEstimate] = []
         for time_us, view in self._views:
             for estimate in view.gates:
-                if estimate.certain and not _is_at(estimate, estimate.position_m, found):
+                known = (*flown.layout.all_gates, *found)
+                if estimate.certain and not _is_at(estimate, estimate.position_m, known):
                     time_s = (time_us - (flown.began_us or 0)) / 1e6
                     error_m = flown.track.place_error_m(time_s) or (0.0, 0.0, 0.0)
                     corrected = [at - error for at, error in zip(estimate.position_m, error_m, strict=True)]
-                    places = (estimate.position_m, corrected)
-                    if not any(_is_at(estimate, place, flown.layout.all_gates) for place in places):
+                    if not _is_at(estimate, corrected, flown.layout.all_gates):
                         found.append(estimate)
         return len(found)
 
@@ -152,7 +152,7 @@ class CauseWatch:
 
 
 def _is_at(
-    estimate: GateEstimate, place_m: Sequence[float], gates: Sequence[GateEstimate] | Sequence[UprightGate]
+    estimate: GateEstimate, place_m: Sequence[float], gates: Sequence[GateEstimate | UprightGate]
 ) -> bool:
     """Whether a place, in the arena's axes, is that of one of the gates of an estimate's colour."""
     own = (gate for gate in gates if gate.colour == estimate.colour)
