@@ -81,7 +81,7 @@ class CauseWatch:
         found: list[GateEstimate] = []
         for time_us, view in self._views:
             for estimate in view.gates:
-                known = (*flown.layout.all_gates, *found)
+                known: tuple[GateEstimate | UprightGate, ...] = (*flown.layout.all_gates, *found)
                 if estimate.certain and not _is_at(estimate, estimate.position_m, known):
                     time_s = (time_us - (flown.began_us or 0)) / 1e6
                     error_m = flown.track.place_error_m(time_s) or (0.0, 0.0, 0.0)

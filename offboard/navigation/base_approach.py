@@ -1,4 +1,4 @@
-"""The way home of a drone that does not know its place: it looks at the base before it lands on it."""
+"""A drone that does not know its place looks at the base before it lands, and when it has drifted too far."""
 
 from __future__ import annotations
 
@@ -23,23 +23,27 @@ REACH_S = 15.0  # a place that is not reached within so long is given up
 PLACES = 4  # from which it is looked for,
 ROUNDS = 3  # so many times; then the drone lands where it believes the base to be
 ASIDE_RAD = pi / 4  # between two of them
+UNSURE_M, KNOWN_M = 0.5, 0.25  # a standard deviation from which a place is corrected, and until which
+CORRECT_S, PAUSE_S = 25.0, 20.0  # for at most so long, and then not for so long
 
 
 class WayHome:
-    """Where to fly to first, on the way to a point that may be on the base."""
+    """Where to fly to first, on the way to a point, which may be on the base, or while exploring."""
 
     def __init__(self, base: Base, arena: Arena) -> None:
         self._base, self._arena = base, arena
         self._approach: BaseApproach | None = None
+        self._correction: BaseApproach | None = None
+        self._until_us = self._not_before_us = 0  # of corrections
 
     def begin(self) -> None:
         """Forget the way that was flown."""
-        self._approach = None
+        self._approach = self._correction = None
 
     @property
     def looks(self) -> bool:
         """The drone is on its way to a place from which it looks at the base, or is there."""
-        return self._approach is not None and not self._approach.lands
+        return self._correction is not None or (self._approach is not None and not self._approach.lands)
 
     @property
     def searches(self) -> bool:
@@ -59,7 +63,7 @@ class WayHome:
             no_path: there is none to where it was to fly.
         """
         if known is None or not is_over_base(self._base, goal_m[0], goal_m[1]):
-            return Point(goal_m)
+            return self.correction(state, known, no_path=no_path) or Point(goal_m)
         here_m = (state.x, state.y, state.z)
         if self._approach is None:
             self._approach = BaseApproach(self._base, self._arena, goal_m, here_m)
@@ -67,9 +71,33 @@ class WayHome:
             self._approach.refuse(here_m)
         return self._approach.goal(state, *known)
 
+    def correction(
+        self, state: DroneState, known: tuple[int, float] | None, *, no_path: bool
+    ) -> Point | None:
+        """From where to look at the base, before the drone goes on with a place that is too uncertain.
+
+        None: it is known well enough, or looking has not helped. Arguments as for `goal`.
+        """
+        base, here_m, now_us = self._base, (state.x, state.y, state.z), state.time_us
+        if known is None:
+            return None
+        _, std_m = known
+        if self._correction is None:
+            if std_m < UNSURE_M or now_us < self._not_before_us:
+                return None
+            self._correction = BaseApproach(base, self._arena, (base.x_m, base.y_m, base.top_m), here_m)
+            self._until_us = now_us + round(CORRECT_S * 1e6)
+        elif no_path:
+            self._correction.refuse(here_m)
+        place = self._correction.goal(state, *known)
+        if std_m > KNOWN_M and now_us < self._until_us and not self._correction.lands:
+            return place
+        self._correction, self._not_before_us = None, now_us + round(PAUSE_S * 1e6)
+        return None
+
 
 class BaseApproach:
-    """Where to fly to, in order to land on a base.
+    """Where to fly to, in order to see a base well and to land on it.
 
     Args:
         base: whose place is known.

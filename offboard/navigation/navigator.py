@@ -147,35 +147,30 @@ class Navigator:
         return NavigationView(self._world.gates, points, self._action, trouble)
 
     def explore(self) -> VelocityFluCommand:
-        """Fly to the view that shows most of what has not been seen."""
-        return self._compensated(self._explore())
-
-    def _explore(self) -> VelocityFluCommand:
+        """Fly to the view that shows most of what was not seen yet, or corrects the place."""
         state, now_s = self._begin("explore")
-        if self._goal is None or now_s - self._chosen_s >= EXPLORE_S:
-            flight = self._flight
-            lost = flight.path is None and flight.search is None and flight.refusal
-            if self._goal is not None and lost:
+        way, no_path = self._way_home, _has_no_path(self._flight)
+        looked = way.looks
+        look = way.correction(state, _base_known(self._world, state), no_path=no_path)
+        if look is not None:
+            return self._fly_towards(look)
+        if looked or self._goal is None or now_s - self._chosen_s >= EXPLORE_S:
+            if self._goal is not None and no_path and not looked:
                 self._world.refuse_viewpoint()
-            flight.spent += VIEWPOINT_WORK
+            self._flight.spent += VIEWPOINT_WORK
             viewpoint = self._world.next_viewpoint(position_now(state), state.yaw)
             self._goal, self._chosen_s = Point(viewpoint.position_m, viewpoint.yaw_rad), now_s
-        return self._fly(self._goal)
+        return self._compensated(self._fly(self._goal))
 
     def fly_to(self, goal_m: Vec3) -> VelocityFluCommand:
         """Fly to a point on a smooth path; to one on the base, when that was looked at if need be."""
         state, _ = self._begin("fly to goal")
-        flight = self._flight
-        known = self._world.localization.base_known(state.time_us - round(SIGHTINGS_S * 1e6))
-        no_path = flight.path is None and flight.search is None and bool(flight.refusal)
-        searched = self._way_home.searches
-        goal = self._way_home.goal(goal_m, state, known, no_path=no_path)
-        if self._way_home.searches and not searched:
+        way, no_path = self._way_home, _has_no_path(self._flight)
+        searched = way.searches
+        goal = way.goal(goal_m, state, _base_known(self._world, state), no_path=no_path)
+        if way.searches and not searched:
             self._world.localization.doubt()
-        if self._goal != goal:
-            self._goal = goal
-            flight.change()
-        return self._compensated(self._fly(goal))
+        return self._fly_towards(goal)
 
     def step_back(self, colour: str) -> VelocityFluCommand:
         """Fly back from a gate, to one of its sides, facing it; one that was refused often begins anew."""
@@ -269,6 +264,13 @@ class Navigator:
         self._acted_s = now_s
         return state, now_s
 
+    def _fly_towards(self, goal: Point) -> VelocityFluCommand:
+        """Fly to a point, on a new path if it is another one than before."""
+        if self._goal != goal:
+            self._goal = goal
+            self._flight.change()
+        return self._compensated(self._fly(goal))
+
     def _fly(self, *goals: Goal) -> VelocityFluCommand:
         assert self._state is not None, "observe() comes before any action"
         world = self._world
@@ -307,3 +309,13 @@ def _plus(command: VelocityFluCommand, velocity_flu_m_s: Sequence[float]) -> Vel
         left_m_s=command.left_m_s + left,
         up_m_s=command.up_m_s + up,
     )
+
+
+def _has_no_path(flight: PathFlight) -> bool:
+    """None was found to where the drone was to fly."""
+    return flight.path is None and flight.search is None and bool(flight.refusal)
+
+
+def _base_known(world: WorldModel, state: DroneState) -> tuple[int, float] | None:
+    """See `Localization.base_known`; in the last `SIGHTINGS_S`."""
+    return world.localization.base_known(state.time_us - round(SIGHTINGS_S * 1e6))

@@ -7,12 +7,16 @@ import pytest
 from offboard.drone import DroneState
 from offboard.navigation.base_approach import (
     BEFORE_M,
+    CORRECT_S,
     FARTHER_M,
+    KNOWN_M,
+    PAUSE_S,
     PLACES,
     REACH_S,
     ROUNDS,
     SEARCH_S,
     SIGHTINGS,
+    UNSURE_M,
     WayHome,
 )
 from scenarios.models import Arena, Base
@@ -121,3 +125,46 @@ def test_one_that_is_not_seen_is_first_looked_for_farther_around_and_from_farthe
     way.goal(GOAL_M, state_at(*farther.position_m, 13.0), NOT_SEEN, no_path=False)
     seen_there = way.goal(GOAL_M, state_at(*farther.position_m, 13.5), SEEN, no_path=False)
     assert seen_there.position_m == GOAL_M
+
+
+BESIDE_M = (BASE.x_m - 3.0, BASE.y_m, 1.0)  # a goal that is not on the base
+LOST, FOUND, BETWEEN = (0, UNSURE_M + 0.1), (0, KNOWN_M - 0.05), (0, 0.4)
+
+
+def corrected(way: WayHome, known: tuple[int, float], time_s: float) -> bool:
+    """Whether the drone flies to a place from which it looks at the base instead of to its goal."""
+    place = way.goal(BESIDE_M, state_at(-3.0, 0.0, 1.0, time_s), known, no_path=False)
+    return place.position_m != BESIDE_M
+
+
+def test_a_place_that_is_too_uncertain_is_corrected_at_the_base_before_the_drone_goes_on() -> None:
+    way = WayHome(BASE, Arena())
+    assert not corrected(way, BETWEEN, 10.0)
+    place = way.goal(BESIDE_M, state_at(-3.0, 0.0, 1.0, 10.1), LOST, no_path=False)
+    assert away_m(place.position_m) == pytest.approx(BEFORE_M)
+    x, y, _ = place.position_m
+    assert place.yaw_rad == pytest.approx(atan2(BASE.y_m - y, BASE.x_m - x))
+    assert way.looks
+    assert corrected(way, BETWEEN, 15.0)  # not until it is known well
+    assert not corrected(way, FOUND, 16.0)
+    assert not way.looks
+
+
+def test_a_correction_that_does_not_help_ends_and_is_not_tried_again_at_once() -> None:
+    way = WayHome(BASE, Arena())
+    assert corrected(way, LOST, 10.0)
+    assert corrected(way, LOST, 10.0 + CORRECT_S - 0.1)
+    assert not corrected(way, LOST, 10.0 + CORRECT_S + 0.1)
+    assert not corrected(way, LOST, 10.0 + CORRECT_S + PAUSE_S - 0.1)
+    assert corrected(way, LOST, 10.0 + CORRECT_S + PAUSE_S + 0.3)
+
+
+def test_the_way_to_a_correction_that_is_shut_leads_from_another_side() -> None:
+    way = WayHome(BASE, Arena())
+    here = state_at(-3.0, 0.0, 1.0)
+    first = way.correction(here, LOST, no_path=False)
+    other = way.correction(here, LOST, no_path=True)
+    assert first is not None
+    assert other is not None
+    assert first.position_m != other.position_m
+    assert away_m(other.position_m) == pytest.approx(BEFORE_M)

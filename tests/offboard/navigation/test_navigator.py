@@ -1,6 +1,7 @@
 """What the navigator does with a goal, and when it needs every image."""
 
 from dataclasses import replace
+from math import hypot
 
 import pytest
 
@@ -8,10 +9,12 @@ from framerunner.flying.plan import FlightPlan
 from offboard.drone import DroneState
 from offboard.mission import load_mission
 from offboard.navigation import path_flight
+from offboard.navigation.base_approach import BEFORE_M
 from offboard.navigation.goals import PathGate, Refusal
 from offboard.navigation.navigator import Navigator
 from offboard.navigation.view import GateEstimate
 from offboard.navigation.world_model import WorldModel
+from offboard.place.localization import Localization
 from scenarios.random_scenarios import load_level, random_scenario
 from tests.offboard.navigation.flown_layouts import flown
 
@@ -137,3 +140,28 @@ def test_a_gate_that_is_refused_again_and_again_begins_anew(monkeypatch):
         counts.append(len(forgotten))
     assert counts == [0, 0, 1, 1, 1, 2]
     assert set(forgotten) == {"red"}
+
+
+def test_a_drone_that_does_not_know_its_place_looks_at_the_base_before_it_explores_on(monkeypatch):
+    plan = FlightPlan(random_scenario(load_level("calm"), 1), load_mission("explorer"))
+    navigator = Navigator(plan.surroundings, plan.command_limits)
+    base = plan.surroundings.base
+    goals_m, known = [], (0, 0.6)
+
+    class Noting(path_flight.Search):
+        def path(self, start=None):
+            goals_m.append(self.goals[0].position_m)
+            return super().path(start)
+
+    def looks_at_the_base(ticks):
+        goals_m.clear()
+        for tick in ticks:
+            navigator.observe(replace(STATE, time_us=50_000 * tick, velocity_arena_m_s=(0.0, 0.0, 0.0)), ())
+            navigator.explore()
+        return {hypot(x - base.x_m, y - base.y_m) == pytest.approx(BEFORE_M) for x, y, _ in goals_m}
+
+    monkeypatch.setattr(path_flight, "Search", Noting)
+    monkeypatch.setattr(Localization, "base_known", lambda self, since_us: known)
+    assert looks_at_the_base(range(20)) == {True}
+    known = (4, 0.1)
+    assert looks_at_the_base(range(20, 40)) == {False}
