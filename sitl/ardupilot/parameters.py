@@ -124,6 +124,9 @@ def _flow_parameters(suite: SuiteSpec) -> dict[str, Value]:
             _LEAST_FLOW_NOISE_RAD_S, flow.noise_rad_s / sqrt(FLOW_PERIOD_US * 1e-6 * flow.rate_hz)
         ),
         "EK3_MAX_FLOW": min(_MOST_FLOW_RAD_S, flow.max_flow_rad_s),
+        "EK3_ALT_M_NSE": 0.2,
+        "INS_GYRO_FILTER": 80,
+        "SIM_BARO_RND": 0.2,
         "EK3_SRC1_POSXY": 0,
         "EK3_SRC1_VELXY": _OPTICAL_FLOW,
         "EK3_SRC1_VELZ": 0,
@@ -137,7 +140,7 @@ def _flow_parameters(suite: SuiteSpec) -> dict[str, Value]:
             "RNGFND1_MIN": range_finder.min_distance_m,
             "RNGFND1_MAX": range_finder.max_distance_m,
             "EK3_RNG_M_NSE": 0.01,  # a variance, m²; with 0.5 the ground beside a base counts after seconds
-            "EK3_TERR_GRAD": 0.2,  # likewise
+            "EK3_TERR_GRAD": 0.5,  # likewise
         }
     return values
 
