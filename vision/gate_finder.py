@@ -51,6 +51,7 @@ _THIN_BAR_SHARE = (
 _SURE = 0.6  # chance from which on a gate is found by networks alone
 _CERTAIN = 0.97  # and one with wide bars
 _NARROW, _WIDE, _BLUR_PX = 0.6, 1.5, 1.5  # limits of widths of bars by what follows from the pose
+_CORNERS_OF_BOX = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
 _OPENING_PX = 12  # a region smaller than this is not looked at for an opening
 
 
@@ -107,7 +108,7 @@ class GateFinder:
         seen: tuple[Floats, Outlines] | None = None
         if len(regions) > _CLUTTER or has_coloured_lines(image, [region.box for region in regions]):
             seen = find_outlines(image)
-            regions = [region for region in regions if _is_worth_fitting(region, seen[1])]
+            regions = _worth_fitting(image, regions, seen[1])
         found = [one for region in regions for one in self._of_region(region)]
         known = [box for box, _ in found]
         if seen is None and len(found) < len(regions) and has_coloured_lines(image, known):
@@ -261,7 +262,16 @@ def _is_part(one: _Found, gates: Sequence[_Found]) -> bool:
     )
 
 
-def _is_worth_fitting(region: _Region, outlines: Outlines) -> bool:
+def _worth_fitting(image: Image, regions: Sequence[_Region], outlines: Outlines) -> list[_Region]:
+    """Those of some regions that may be gates by the networks, of which the first one proposes not all."""
+    asked = [region for region in regions if not _may_be_gate(region, outlines)]
+    boxes = np.array([region.box for region in asked], np.float64).reshape(-1, 1, 4)
+    chances, _ = judge(image, boxes[..., :2] + _CORNERS_OF_BOX * (boxes[..., 2:] - 1.0))
+    denied = [region for region, chance in zip(asked, chances.tolist(), strict=True) if chance < _SURE]
+    return [region for region in regions if region not in denied]
+
+
+def _may_be_gate(region: _Region, outlines: Outlines) -> bool:
     """Whether networks see a gate in a region, or it may be a part of one, which they do not know."""
     if any(_is_inside(outline, region.box) for outline in outlines):
         return True
