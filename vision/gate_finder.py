@@ -49,6 +49,9 @@ _THIN_BAR_SHARE = (
     1 / 128
 )  # of the image's width; wider bars have pixels of their own colour, which tell their width
 _SURE = 0.6  # chance from which on a gate is found by networks alone
+_CERTAIN = 0.97  # and one with wide bars
+_NARROW, _WIDE, _BLUR_PX = 0.6, 1.5, 1.5  # limits of widths of bars by what follows from the pose
+_CORNERS_OF_BOX = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
 _OPENING_PX = 12  # a region smaller than this is not looked at for an opening
 
 
@@ -105,7 +108,7 @@ class GateFinder:
         seen: tuple[Floats, Outlines] | None = None
         if len(regions) > _CLUTTER or has_coloured_lines(image, [region.box for region in regions]):
             seen = find_outlines(image)
-            regions = [region for region in regions if _is_worth_fitting(region, seen[1])]
+            regions = _worth_fitting(image, regions, seen[1])
         found = [one for region in regions for one in self._of_region(region)]
         known = [box for box, _ in found]
         if seen is None and len(found) < len(regions) and has_coloured_lines(image, known):
@@ -114,7 +117,7 @@ class GateFinder:
             chances, outlines = seen
             found = _likely(image, found, outlines)
             known = [box for box, sighting in found if sighting.poses]
-            whole = self._of_outlines(image, known, outlines[chances > _SURE])
+            whole = self._of_outlines(image, known, chances, outlines)
             found = [one for one in found if one[1].poses or not _is_part(one, whole)] + whole
         edges = self._obstacle_edges(masks)
         height, width = image.shape[:2]
@@ -148,22 +151,24 @@ class GateFinder:
                 return alone
         return [] if sighting is None else [sighting]
 
-    def _of_outlines(self, image: Image, known: Sequence[_Box], outlines: Outlines) -> list[_Found]:
+    def _of_outlines(
+        self, image: Image, known: Sequence[_Box], chances: Floats, outlines: Outlines
+    ) -> list[_Found]:
         """The gates that networks see outside boxes."""
         found: list[_Found] = []
         bright = 0.0
-        for outline in outlines:
-            if any(_is_inside(outline, box) for box in known):
+        for chance, outline in zip(chances.tolist(), outlines, strict=True):
+            if chance <= _SURE or any(_is_inside(outline, box) for box in known):
                 continue
             bright = bright or brightness_of_gates(image)
             ring = fit_ring(fill_around(image, outline, MOST_PX, bright), outline)
-            sighting = None if ring is None else self._thin_sighting(ring, image)
+            sighting = None if ring is None else self._ring_sighting(ring, image, chance)
             if sighting is not None:
                 found.append(sighting)
         return found
 
-    def _thin_sighting(self, ring: Ring, image: Image) -> _Found | None:
-        """The gate that a ring of thin lines is, if it is one."""
+    def _ring_sighting(self, ring: Ring, image: Image, chance: float) -> _Found | None:
+        """The gate that a ring of lines is, if it is one; wide lines must be one by a greater chance."""
         height, width = image.shape[:2]
         middle = np.array([(width - 1) / 2, (height - 1) / 2])
         places = ring.corners - middle
@@ -181,7 +186,8 @@ class GateFinder:
         if best is None:
             return None
         distance_m = hypot(*best.poses[0].position_flu_m)
-        if self._focal_px * model.shape.bar_m > _THIN_BAR_SHARE * width * distance_m:
+        bar_px = self._focal_px * model.shape.bar_m / distance_m
+        if bar_px > _THIN_BAR_SHARE * width and not (chance > _CERTAIN and _is_as_wide(ring.bar_px, bar_px)):
             return None
         box = _bounding_box(np.rint(ring.corners).astype(np.int32))
         return box, GateSighting(ring.colour, best.corners, best.whole, best.poses)
@@ -233,6 +239,11 @@ class GateFinder:
         return best
 
 
+def _is_as_wide(seen_px: float, bar_px: float) -> bool:
+    """Whether the upper and lower bars of a gate whose bars have a width may look so wide."""
+    return _NARROW * bar_px < seen_px < _WIDE * bar_px + _BLUR_PX
+
+
 def _is_inside(outline: Outline, box: _Box) -> bool:
     """Whether the middle of an outline is in a box."""
     column, row, columns, rows = box
@@ -251,7 +262,16 @@ def _is_part(one: _Found, gates: Sequence[_Found]) -> bool:
     )
 
 
-def _is_worth_fitting(region: _Region, outlines: Outlines) -> bool:
+def _worth_fitting(image: Image, regions: Sequence[_Region], outlines: Outlines) -> list[_Region]:
+    """Those of some regions that may be gates by the networks, of which the first one proposes not all."""
+    asked = [region for region in regions if not _may_be_gate(region, outlines)]
+    boxes = np.array([region.box for region in asked], np.float64).reshape(-1, 1, 4)
+    chances, _ = judge(image, boxes[..., :2] + _CORNERS_OF_BOX * (boxes[..., 2:] - 1.0))
+    denied = [region for region, chance in zip(asked, chances.tolist(), strict=True) if chance < _SURE]
+    return [region for region in regions if region not in denied]
+
+
+def _may_be_gate(region: _Region, outlines: Outlines) -> bool:
     """Whether networks see a gate in a region, or it may be a part of one, which they do not know."""
     if any(_is_inside(outline, region.box) for outline in outlines):
         return True

@@ -24,6 +24,7 @@ MOST_PX = 60.0
 """Larger gates are fitted in a reduced image, in which their bars are thin."""
 _PLACES = (0.08 + 0.84 * (np.arange(10.0) + 0.5) / 10.0)[:, None]  # along a side, shape (10, 1)
 _REACHES = (3, 2, 2)  # pixels on both sides of an estimate in which a ridge is looked for
+_ACROSS = np.arange(-8.0, 8.25, 0.5)  # places across a bar, pixels
 _LEAST_PURER = 0.08  # of a colour in its bars than beside them
 _DARK = 3.0  # of 255: less is noise
 _LIKELY = np.array([1.0 if len(own) == 1 else 0.6 for own in CHANNELS.values()])  # compressed colours mix
@@ -41,11 +42,13 @@ class Ring:
         colour: of its bars.
         corners: where the axes of its bars meet, columns and rows of the image, shape (4, 2), clockwise.
         std_px: standard deviation of the corners' coordinates.
+        bar_px: width of its upper and lower bars, pixels of the image; blur adds to it.
     """
 
     colour: str
     corners: Floats
     std_px: float
+    bar_px: float
 
 
 def fit_ring(filled: FilledPixels, outline: Floats) -> Ring | None:
@@ -69,7 +72,8 @@ def fit_ring(filled: FilledPixels, outline: Floats) -> Ring | None:
         axes, std_px = corners[k] - planes[k], hypot(_LEAST_STD_PX, _STD_SHARE * deviations[k])
     else:
         axes, std_px = quad, _OUTLINE_STD_PX
-    return Ring(colour, (axes + 0.5) * scale - 0.5 + origin, std_px * max(filled.scale))
+    bar_px = _bar_width(filled.share, (axes + planes[k])[None]) * float(scale[1])
+    return Ring(colour, (axes + 0.5) * scale - 0.5 + origin, std_px * max(filled.scale), bar_px)
 
 
 def _fitted(share: Shares, corners: Floats) -> tuple[Floats, Floats]:
@@ -141,6 +145,18 @@ def _clearness(share: Shares, corners: Floats) -> Floats:
     parts = np.clip((filled - np.maximum(ground, 0.0)) / mean, -1.0, 1.0)
     clear: Floats = parts.mean(axis=2).min(axis=1)
     return clear
+
+
+def _bar_width(share: Shares, corners: Floats) -> float:
+    """Width of a ring's upper and lower bars where they are filled by half of what they are most."""
+    begin, along, across, _ = _sides(corners)
+    places = (begin + along * _PLACES)[..., None, :] + _ACROSS[:, None] * across[..., None, :]
+    filled = _at(share, places)[0, ::2].reshape(-1, len(_ACROSS))
+    middle = len(_ACROSS) // 2
+    less = filled < 0.5 * filled[:, middle - 2 : middle + 3].max(axis=1, keepdims=True)
+    before, after = less[:, middle::-1], less[:, middle:]
+    runs = [np.where(each.any(axis=1), each.argmax(axis=1), middle) for each in (before, after)]
+    return float(np.median(runs[0] + runs[1]) * (_ACROSS[1] - _ACROSS[0]))
 
 
 def _purer(filled: FilledPixels, corners: Floats) -> Floats:

@@ -40,14 +40,14 @@ class Part:
 
 
 PARTS = (
-    Part("calm", 0.26, _LIT, True),
-    Part("calm", 0.08, CameraChain(), True),
-    Part("sizes", 0.24, _LIT, True),
-    Part("crowded", 0.20, _LIT, True),
-    Part("indoor", 0.06, CameraChain(), False),
-    Part("crowded", 0.06, _LIT, False),
-    Part("calm", 0.05, _SENT, True),
-    Part("sizes", 0.05, _SENT, True),
+    Part("calm", 0.20, _LIT, True),
+    Part("calm", 0.06, CameraChain(), True),
+    Part("sizes", 0.18, _LIT, True),
+    Part("crowded", 0.16, _LIT, True),
+    Part("indoor", 0.05, CameraChain(), False),
+    Part("crowded", 0.05, _LIT, False),
+    Part("calm", 0.18, _SENT, True),
+    Part("sizes", 0.12, _SENT, True),
 )
 
 
