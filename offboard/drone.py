@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import AsyncGenerator
 from dataclasses import dataclass
-from enum import Enum
 from math import isfinite, isnan, sqrt
 from typing import Literal, Protocol
 
@@ -14,17 +13,6 @@ from framerunner.geometry.vectors import Quaternion, Vec3
 
 class DroneError(UserError):
     """The drone cannot do what was requested; the message is one line for people."""
-
-
-class ResponsePrior(Enum):
-    """What is known of how a vehicle follows velocities before it has flown."""
-
-    OWN = "own"
-    """It may be this project's autopilot, whose velocity loops can be inverted."""
-    UNKNOWN = "unknown"
-    """It is another one: its motion must be predicted from its first commands on."""
-    LATE = "late"
-    """Likewise, and it needs about half a second for 1 m/s sideways, as PX4 with our parameters does."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +97,6 @@ class DroneState:
     position_age_s: float = 0.0  # how much older the position and the velocity are than `time_us`
     attitude_arena: Quaternion = (1.0, 0.0, 0.0, 0.0)  # body FLU to arena, with the heading `yaw`
     camera_attitude_arena: Quaternion | None = None  # of a camera on a gimbal, forward-left-up to arena
-    response_prior: ResponsePrior = ResponsePrior.OWN
     imu: tuple[ImuInterval, ...] = ()  # since the state before, oldest first; empty: it sends none
     estimate: PlaceEstimate | None = None  # if the app has estimated itself where the drone is, and how well
     accuracy: ReportedAccuracy | None = None  # None: the vehicle does not tell

@@ -15,7 +15,7 @@ from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 
 from framerunner.geometry.axes import ArenaAlignment, Pose
 from framerunner.wire.transports.urls import parse_url
-from offboard.drone import DroneError, DroneState, LimitedCommand, ResponsePrior, VelocityFluCommand
+from offboard.drone import DroneError, DroneState, LimitedCommand, VelocityFluCommand
 from offboard.limits import STILL, VelocityLimits
 from offboard.link.autopilots import open_dialect
 from offboard.link.companion import Companion
@@ -194,7 +194,7 @@ class MavsdkDrone:
         self._dialect = new = await open_dialect(system, self._direct, self._feed, room_m, stepped=steps)
         self._feed.subscribe(synchronous(self._telemetry), synchronous(self._direct), new.kind.numbered_modes)
         self._inertial.subscribe(synchronous(self._direct), tells_accuracy=new.kind.tells_accuracy)
-        if new.response_prior is not ResponsePrior.OWN:
+        if new.has_resets:
             self._resets.subscribe(synchronous(self._direct))
         if self._place is not None:
             self._place.begin(DirectMessages(self._direct, system_id))

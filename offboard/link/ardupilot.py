@@ -26,7 +26,7 @@ from mavsdk.asyncio import MavsdkError
 
 from framerunner.wire import ardupilot_modes
 from framerunner.wire.dialect import mavlink
-from offboard.drone import ResponsePrior, VelocityFluCommand
+from offboard.drone import VelocityFluCommand
 from offboard.link.dialect import AutopilotKind, ModeNames
 from offboard.link.direct import DirectDialect, DirectMessages
 from offboard.link.stepped import SteppedDialect
@@ -106,7 +106,7 @@ class ArduPilotDialect(DirectDialect):
     """
 
     kind = ARDUPILOT
-    response_prior = ResponsePrior.UNKNOWN
+    has_resets = True
 
     def __init__(
         self,
@@ -169,7 +169,7 @@ class SteppedArduPilotDialect(SteppedDialect):
     """
 
     kind = ARDUPILOT
-    response_prior = ResponsePrior.UNKNOWN
+    has_resets = True
 
     def __init__(
         self,

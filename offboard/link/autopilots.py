@@ -12,7 +12,7 @@ from mavsdk.asyncio.plugins.info import InfoAsync
 from mavsdk.asyncio.plugins.offboard import OffboardAsync
 
 from framerunner.wire.vehicle_identity import is_simulator
-from offboard.drone import DroneError, ResponsePrior
+from offboard.drone import DroneError
 from offboard.link.ardupilot import ArduPilotDialect, SteppedArduPilotDialect
 from offboard.link.dialect import Dialect
 from offboard.link.px4 import Px4Dialect, SteppedPx4Dialect
@@ -55,8 +55,7 @@ async def open_dialect(
     if stepped:
         return SteppedPx4Dialect(direct, system_id)
     own = await is_own_autopilot(InfoAsync(system), system_id)
-    prior = ResponsePrior.OWN if own else ResponsePrior.UNKNOWN
-    return Px4Dialect(OffboardAsync(system), action, prior)
+    return Px4Dialect(OffboardAsync(system), action, has_resets=not own)
 
 
 async def is_own_autopilot(info: Any, system_id: int) -> bool:  # noqa: ANN401

@@ -11,7 +11,7 @@ from collections.abc import Awaitable, Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, Protocol
 
-from offboard.drone import ResponsePrior, VelocityFluCommand
+from offboard.drone import VelocityFluCommand
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,12 +66,12 @@ class Dialect(ABC):
 
     Attributes:
         kind: of its autopilot.
-        response_prior: how it follows velocities, as far as is known before the flight.
+        has_resets: its estimator may turn or move its local frame in flight, see `resets.py`.
         ended: no setpoint is sent any more.
     """
 
     kind: ClassVar[AutopilotKind]
-    response_prior: ResponsePrior
+    has_resets: bool
     ended = False
 
     @property

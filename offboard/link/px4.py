@@ -20,7 +20,7 @@ from mavsdk.plugins.offboard import VelocityBodyYawspeed
 from framerunner.wire import px4_modes
 from framerunner.wire.dialect import mavlink
 from framerunner.wire.px4_modes import Px4Mode
-from offboard.drone import ResponsePrior, VelocityFluCommand
+from offboard.drone import VelocityFluCommand
 from offboard.link import inertial
 from offboard.link.dialect import AutopilotKind, Dialect, ModeNames
 from offboard.link.direct import synchronous
@@ -60,7 +60,7 @@ class Px4Dialect(Dialect):
     Args:
         offboard: the plugin.
         action: likewise.
-        response_prior: framerunner's own autopilot presents itself as PX4, so it is not always PX4's.
+        has_resets: framerunner's own autopilot, which presents itself as PX4, has none.
     """
 
     kind = PX4
@@ -69,9 +69,9 @@ class Px4Dialect(Dialect):
         self,
         offboard: OffboardAsync,
         action: Any,  # noqa: ANN401 - MAVSDK is untyped
-        response_prior: ResponsePrior = ResponsePrior.OWN,
+        has_resets: bool = False,
     ) -> None:
-        self.response_prior = response_prior
+        self.has_resets = has_resets
         self._offboard, self._action = offboard, action
         # It stores four numbers (5 us); the asyncio one takes an executor job (190 us).
         self._direct: Any = synchronous(offboard)
@@ -133,7 +133,7 @@ class SteppedPx4Dialect(SteppedDialect):
     """One PX4, which returns PINGs itself; see `SteppedDialect`."""
 
     kind = PX4
-    response_prior = ResponsePrior.LATE
+    has_resets = True
 
     def __init__(self, direct: Any, system_id: int) -> None:  # noqa: ANN401 - MAVSDK is untyped
         super().__init__(direct, system_id)

@@ -44,7 +44,6 @@ def reported_state(
         position_age_s=max(0.0, (sample.time_us - sample.position_us) * 1e-6),
         attitude_arena=alignment.attitude(sample.attitude_ned),
         camera_attitude_arena=None if camera_ned is None else alignment.attitude(camera_ned),
-        response_prior=dialect.response_prior,
         imu=() if inertial is None else inertial.take(sample.time_us),
         accuracy=None if inertial is None else inertial.accuracy,
         missed=missed,

@@ -9,7 +9,7 @@ from typing import Any
 from framerunner.geometry.gate_shape import PAPER_GATE, GateShape
 from framerunner.geometry.vectors import Vec3
 from offboard.limits import CommandLimits
-from offboard.response import Response
+from offboard.response.estimate import Response
 from scenarios.models import Base
 
 HEADROOM = 0.92
@@ -20,8 +20,10 @@ VIEW_MARGIN_M = 0.04  # beside a gate that is in view
 PRESENT_SHARE = 1.15
 """Of the crossing speed: a drone that is faster at the start of a path brakes to this before an opening."""
 LOOK_AGAIN_M = 1.0
-MIN_LATE = 0.6
-"""So gently, from 0 to 1, a vehicle that answers late is flown at least: its loops are not known exactly."""
+UNKNOWN_LATE = 0.3
+"""So gently, from 0 to 1, a vehicle is flown at least whose response is not known yet."""
+LATE_S = (0.2, 0.7)
+"""A vehicle that answers sooner is not flown gently, and one that answers later not more gently."""
 LOOK_BRAKING_M = 0.5
 
 
@@ -140,12 +142,14 @@ class FlightStyle:
     looks_ahead: bool = True
 
     def adapted(self, response: Response) -> FlightStyle:
-        """The style for a vehicle that answers late: gentler, the later it answers."""
-        late = min(max((response.level_s - 0.5) / 0.5, MIN_LATE), 1.0)
+        """The style for a vehicle: gentler, the later it answers."""
+        soon_s, late_s = LATE_S
+        late = min(max((response.late_s - soon_s) / (late_s - soon_s), 0.0), 1.0)
+        late = late if response.known else max(late, UNKNOWN_LATE)
         return replace(
             self,
-            lag_s=response.level_lags_s,
-            climb_lag_s=response.climb_lag_s,
+            lag_s=max(self.lag_s, response.level_lag_s),
+            climb_lag_s=max(self.climb_lag_s, response.climb_lag_s),
             path_speed_m_s=self.path_speed_m_s * (1.0 - 0.4 * late),
             axis_speed_m_s=self.axis_speed_m_s * (1.0 - 0.35 * late),
             climb_speed_m_s=self.climb_speed_m_s * (1.0 - 0.4 * late),

@@ -22,7 +22,7 @@ from offboard.navigation.planner.passages import load_graphs
 from offboard.navigation.planning import Search, obstructed
 from offboard.navigation.search.lookout import Lookout, turn_to
 from offboard.navigation.seen_space import SeenSpace, ViewedSpace
-from offboard.response import Prediction, ResponseEstimate
+from offboard.response.estimate import Response
 from scenarios.models import Arena
 
 STILL = VelocityFluCommand()
@@ -48,7 +48,7 @@ LOOKED_AT_RAD = 0.3
 LOOK_GAIN_PER_S = 2.0
 LOOK_RAD_S = 0.9
 STOPPED_M_S = 0.2
-KEEP_MODEL_S = (-0.5, 2.0)  # to a gate, less than 0 behind it: then the model of a late vehicle is kept
+KEEP_MODEL_S = (-0.5, 2.0)  # to a gate, less than 0 behind it: then the vehicle's model is kept
 
 
 class PathFlight:
@@ -72,12 +72,13 @@ class PathFlight:
         self.work = self.spent = 0
         load_graphs()
         self.arena = arena
-        self._style = self._usual_style = style
+        self._usual_style = style
         self._follower = PathFollower(limits=limits)
         self._left: Path | None = None  # which the drone stops on
         self._anew = False  # the path begins with the drone's own motion
         self._lookout = Lookout(arena, style)
-        self._response = ResponseEstimate()
+        self._response = Response()  # that the style is for
+        self._style = style.adapted(self._response)
         self._planned_for: tuple[tuple[Goal, ...], Obstacles] | None = None
         self._checked: tuple[Path, int, tuple[Vec3, ...]] | None = None  # and which obstacles there were
         self._checked_s = 0.0
@@ -88,15 +89,12 @@ class PathFlight:
         self._watched_s = 0.0  # when the drone began to look there
 
     def learn(self, state: DroneState, sent: VelocityFluCommand | None) -> None:
-        """How late the vehicle answers, from the command that it had since the last tick; call every tick."""
-        near_gate = self._response.response.late and self._is_near_gate()  # it matters of a late one only
-        self._response.update(state, sent, near_gate=near_gate)
-        response = self._response.response
-        if not response.late:
-            self._follower.observe(state, state.time_us * 1e-6, sent)
-        if response != self._follower.response:
-            self._follower.response = response
-            self._style = self._usual_style.adapted(response) if response.late else self._usual_style
+        """How the vehicle responds, from the command that it had since the last tick; call every tick."""
+        self._follower.observe(state, state.time_us * 1e-6, sent, near_gate=self._is_near_gate())
+        response = self._follower.estimate.response
+        if response != self._response:
+            self._response = response
+            self._style = self._usual_style.adapted(response)
             self._planned_for = self.search = None
 
     def _is_near_gate(self) -> bool:
@@ -213,15 +211,14 @@ class PathFlight:
             return self._stand(state, turn_rad_s or 0.0)
         now_s = state.time_us * 1e-6
         if self._anew:  # not before: until then the drone may brake on the path that it has left
-            self._follower.begin(now_s)
+            self._follower.begin()
         self._left, self._anew = None, False
-        prediction = self._response.predict() if self._follower.response.late else None
-        return self._follower.command(self.path, state, now_s, prediction, turn_rad_s=turn_rad_s)
+        return self._follower.command(self.path, state, now_s, turn_rad_s=turn_rad_s)
 
     def leave(self) -> None:
         """Stop, on the path if it is flown already."""
         if not self._anew:
-            self._left = None if self._follower.response.late else self.path
+            self._left = self.path
         self.path = None
 
     def _stand(self, state: DroneState, turn_rad_s: float) -> VelocityFluCommand:
@@ -257,7 +254,7 @@ class PathFlight:
             braking = self._follower.braking() if self._left is not None else None
             if braking is not None:
                 return replace(braking, yaw_rad=state.yaw), True
-        return _own_motion(state, self._response.predict() if self._follower.response.late else None), True
+        return self._follower.own_motion(state), True
 
     def _plan(self, goals: Sequence[Goal], obstacles: Obstacles, state: DroneState) -> None:
         """Begin to search for a path from the motion now."""
@@ -354,16 +351,6 @@ class PathFlight:
         ]
         places_m = self._ahead(AHEAD_S + CHECK_S)
         return obstructed(places_m, gates, obstacles=obstacles, arena=self.arena, style=self._style)
-
-
-def _own_motion(state: DroneState, coming: Prediction | None) -> Motion:
-    """The drone's, when the next command is flown; `coming` is that of a vehicle that answers late."""
-    x, y, z = position_now(state)
-    if coming is None:
-        return Motion((x, y, z), state.velocity_arena_m_s, state.yaw)
-    dx, dy, dz = coming.moved_m
-    yaw_rad = state.yaw + coming.turned_rad
-    return Motion((x + dx, y + dy, z + dz), coming.velocity_m_s, yaw_rad, coming.yaw_rate_rad_s)
 
 
 def position_now(state: DroneState) -> Vec3:

@@ -1,97 +1,105 @@
-"""The response of vehicles that answer late is learnt in flight, and their motion is predicted."""
+"""The response of a vehicle is identified in flight, whatever its loops, and its motion is predicted."""
+
+from __future__ import annotations
 
 from collections import deque
-from dataclasses import replace
-from math import cos, exp, hypot, pi, remainder, sin
+from dataclasses import dataclass, field
+from math import atan2, cos, exp, hypot, pi, remainder, sin, tan
 
 import pytest
 
-from offboard.drone import DroneState, ResponsePrior, VelocityFluCommand
-from offboard.response import ResponseEstimate
+from framerunner.geometry.rotations import quaternion_from_euler
+from framerunner.geometry.vectors import turned
+from offboard.drone import DroneState, VelocityFluCommand
+from offboard.response.estimate import ResponseEstimate
+from offboard.response.rate_response import RateResponse
+from offboard.response.tilt_loop import GRAVITY_M_S2
 
-STEP_S = 0.05
+TICK_S = 0.05
+STEPS = 10  # of the simulated vehicle in a tick
 
 
+@dataclass
 class Vehicle:
-    """Follows commands after a dead time, with a lag; in axes that turn with its heading, or do not.
+    """A multicopter with a velocity loop, which asks for a tilt of B r - K v + I integral."""
 
-    With a lag of its own it follows what comes of that with another lag, in axes that turn.
-    """
+    command: float = 0.3
+    velocity: float = 0.3
+    integral: float = 0.0
+    drag_per_m: float = 0.3
+    compensates: bool = False  # drag, and level axes that turn
+    tilt_lag_s: float = 0.08
+    dead_s: float = 0.0
+    lag_s: float = 0.0  # of commands in arena axes, before the loop
+    wind_m_s2: float = 0.0
+    ticks: int = 0
+    yaw: float = 0.3
+    turn: float = 0.0
+    up: float = 0.0
+    position: list[float] = field(default_factory=lambda: [0.0, 0.0, 1.0])
+    plan: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    tilts: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    integrals: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    lagged: tuple[float, float] = (0.0, 0.0)
 
-    def __init__(
-        self, dead_s, lag_s, *, turning=False, drift_m_s=0.0, own_lag_s=0.0, prior=ResponsePrior.OWN
-    ):
-        self.prior = prior
-        self.own_lag_s, self.own = own_lag_s, (0.0, 0.0)
-        self.lag_s, self.turning, self.drift_m_s = lag_s, turning, drift_m_s
-        self.waiting = deque([(0.0, 0.0, 0.0, 0.0)] * round(dead_s / STEP_S))
-        self.ticks, self.yaw, self.position, self.speeds = 0, 0.3, [0.0, 0.0, 1.0], [0.0] * 4
+    def __post_init__(self) -> None:
+        self.waiting = deque([(VelocityFluCommand(), (0.0, 0.0))] * round(self.dead_s / TICK_S))
 
     @property
-    def state(self):
-        c, s = (cos(self.yaw), sin(self.yaw)) if self.turning else (1.0, 0.0)
-        a, b, up, _ = self.speeds
-        x, y = self.own if self.own_lag_s else (c * a - s * b, s * a + c * b)
-        velocity = (x, y, up + self.drift_m_s)
-        time_us = round(self.ticks * STEP_S * 1e6)
+    def state(self) -> DroneState:
+        """As telemetry reports it."""
+        forward, left = self.tilts
+        # In level axes the thrust points forward by one tilt, then to the left by the other.
+        up = cos(left) * cos(forward)
+        roll = -atan2(sin(left), hypot(up, cos(left) * sin(forward)))
+        attitude = quaternion_from_euler(roll, forward, self.yaw)
+        velocity = (self.plan[0], self.plan[1], self.up)
         return DroneState(
-            time_us, *self.position, self.yaw, velocity, landed=False, response_prior=self.prior
+            self.ticks * 50_000, *self.position, self.yaw, velocity, landed=False, attitude_arena=attitude
         )
 
-    def fly(self, command):
-        c, s = (1.0, 0.0) if self.turning else (cos(self.yaw), sin(self.yaw))
-        forward, left = command.forward_m_s, command.left_m_s
-        self.waiting.append(
-            (c * forward - s * left, s * forward + c * left, command.up_m_s, command.yaw_rate_rad_s)
-        )
-        kept = exp(-STEP_S / self.lag_s)
-        self.speeds = [
-            v + (1.0 - kept) * (u - v) for v, u in zip(self.speeds, self.waiting.popleft(), strict=True)
-        ]
-        if self.own_lag_s:
-            self._follow_itself()
-        self.position = [
-            x + v * STEP_S for x, v in zip(self.position, self.state.velocity_arena_m_s, strict=True)
-        ]
-        self.yaw = remainder(self.yaw + self.speeds[3] * STEP_S, 2 * pi)
+    def fly(self, command: VelocityFluCommand) -> None:
+        """A tick."""
+        self.waiting.append((command, turned(command.forward_m_s, command.left_m_s, self.yaw)))
+        given, aim = self.waiting.popleft()
+        step_s = TICK_S / STEPS
+        for _ in range(STEPS):
+            kept = exp(-step_s / self.lag_s) if self.lag_s else 0.0
+            self.lagged = (
+                aim[0] + kept * (self.lagged[0] - aim[0]),
+                aim[1] + kept * (self.lagged[1] - aim[1]),
+            )
+            self._step(given, step_s)
         self.ticks += 1
 
-    def _follow_itself(self):
-        """The second lag: a velocity that stays the same turns with the heading."""
-        kept = exp(-STEP_S / self.own_lag_s)
-        turn = self.speeds[3] * STEP_S
-        c, s, (x, y) = cos(turn), sin(turn), self.own
-        x, y = c * x - s * y, s * x + c * y
-        self.own = (
-            self.speeds[0] + kept * (x - self.speeds[0]),
-            self.speeds[1] + kept * (y - self.speeds[1]),
-        )
+    def _step(self, given: VelocityFluCommand, step_s: float) -> None:
+        wanted = turned(*self.lagged, -self.yaw) if self.lag_s else (given.forward_m_s, given.left_m_s)
+        level = turned(*self.plan, -self.yaw)
+        for axis in (0, 1):
+            v, off = level[axis], wanted[axis] - level[axis]
+            self.integrals[axis] += off * step_s
+            demand = self.command * wanted[axis] - self.velocity * v + self.integral * self.integrals[axis]
+            if self.compensates:
+                demand += self.drag_per_m * v * abs(v) / GRAVITY_M_S2
+                demand += (self.turn if axis else -self.turn) * level[1 - axis] / GRAVITY_M_S2
+            self.tilts[axis] += (demand - self.tilts[axis]) * step_s / self.tilt_lag_s
+        forward = GRAVITY_M_S2 * tan(self.tilts[0])
+        left = hypot(forward, GRAVITY_M_S2) * tan(self.tilts[1])
+        drags = []
+        for tilt, v in zip(self.tilts, level, strict=True):  # along the body's axes
+            along = v * cos(tilt) - self.up * sin(tilt)
+            drags.append(self.drag_per_m * along * abs(along) / cos(tilt))
+        ax, ay = turned(forward - drags[0], left - drags[1], self.yaw)
+        self.plan[0] += (ax + self.wind_m_s2) * step_s
+        self.plan[1] += ay * step_s
+        self.up += (given.up_m_s - self.up) * step_s / 0.1
+        self.turn += (given.yaw_rate_rad_s - self.turn) * step_s / 0.05
+        self.yaw = remainder(self.yaw + self.turn * step_s, 2 * pi)
+        for axis, speed in enumerate((*self.plan, self.up)):
+            self.position[axis] += speed * step_s
 
 
-class PiVehicle(Vehicle):
-    """In plan a velocity loop with PX4's proportional and integral gains against drag, in arena axes."""
-
-    def __init__(self, dead_s, drag_per_s):
-        super().__init__(dead_s, 0.4)
-        self.drag_per_s = drag_per_s
-        self.plan, self.integral_m_s2 = [0.0, 0.0], [0.0, 0.0]
-
-    @property
-    def state(self):
-        return replace(super().state, velocity_arena_m_s=(*self.plan, self.speeds[2]))
-
-    def fly(self, command):
-        coming = self.waiting[0][:2]
-        for axis, wanted in enumerate(coming):
-            for _ in range(10):
-                off = wanted - self.plan[axis]
-                self.integral_m_s2[axis] += 0.4 * off * STEP_S / 10
-                change = 1.8 * off + self.integral_m_s2[axis] - self.drag_per_s * self.plan[axis]
-                self.plan[axis] += change * STEP_S / 10
-        super().fly(command)
-
-
-def command_at(time_s):
+def command_at(time_s: float) -> VelocityFluCommand:
     """Starts, stops, turns and climbs, as of a flight."""
     quarter = int(time_s / 1.5) % 4
     return VelocityFluCommand(
@@ -102,124 +110,101 @@ def command_at(time_s):
     )
 
 
-def learn(vehicle, seconds=15.0):
+def learn(vehicle: Vehicle, seconds: float) -> ResponseEstimate:
+    """The estimate after some seconds of flight."""
     estimate, sent = ResponseEstimate(), None
-    for tick in range(round(seconds / STEP_S)):
+    for tick in range(round(seconds / TICK_S)):
         estimate.update(vehicle.state, sent)
-        sent = command_at(tick * STEP_S)
+        sent = command_at(tick * TICK_S)
         vehicle.fly(sent)
     estimate.update(vehicle.state, sent)
     return estimate
 
 
-@pytest.mark.parametrize(("dead_s", "lag_s"), [(0.15, 0.6), (0.35, 0.45), (0.55, 0.8)])
-@pytest.mark.parametrize("turning", [False, True])
-def test_dead_time_lag_and_axes_are_learnt(dead_s, lag_s, turning):
-    response = learn(Vehicle(dead_s, lag_s, turning=turning)).response
-    assert response.late
-    assert response.turning is turning
-    for dead, lag in (
-        (response.level_dead_s, response.level_lag_s),
-        (response.climb_dead_s, response.climb_lag_s),
-        (response.yaw_dead_s, response.yaw_lag_s),
-    ):
-        assert (dead, lag) == pytest.approx((dead_s, lag_s), abs=0.001)
+OWN = {"command": 0.25, "velocity": 0.5, "integral": 0.66, "drag_per_m": 2.0, "compensates": True}
+VEHICLES = {
+    "weighted set point, integral, drag compensated": OWN,
+    "proportional, light drag": {"command": 0.5, "velocity": 0.5, "drag_per_m": 0.1, "tilt_lag_s": 0.12},
+    "PX4's gains against drag": {"command": 0.18, "velocity": 0.18, "integral": 0.04, "drag_per_m": 0.6},
+    "commands are late": {**OWN, "dead_s": 0.15, "lag_s": 0.6},
+    "commands are very late": {"dead_s": 0.3, "lag_s": 0.4},
+}
 
 
-def test_a_vehicle_that_answers_in_time_is_not_late():
-    estimate = learn(Vehicle(0.05, 0.15, turning=True))
-    assert not estimate.response.late
-
-
-@pytest.mark.parametrize(("prior", "level_s"), [(ResponsePrior.LATE, 0.45), (ResponsePrior.UNKNOWN, 0.65)])
-def test_a_vehicle_that_is_known_to_be_another_is_late_from_the_first_tick_on(prior, level_s):
-    estimate = ResponseEstimate()
-    estimate.update(Vehicle(0.05, 0.15, prior=prior).state, None)
-    assert estimate.response.late
-    assert estimate.response.level_s == pytest.approx(level_s)
-
-
-def test_one_that_was_taken_for_late_and_is_not_is_known_after_some_seconds():
-    response = learn(Vehicle(0.05, 0.15, prior=ResponsePrior.LATE)).response
-    assert response.late  # its loops are not known, so its motion is still predicted
-    assert response.level_dead_s + response.level_lag_s == pytest.approx(0.2)
-
-
-def test_near_a_gate_a_model_that_has_been_known_for_some_time_is_kept():
-    vehicle, estimate, sent = Vehicle(0.15, 0.3, prior=ResponsePrior.LATE), ResponseEstimate(), None
-    for tick in range(round(30.0 / STEP_S)):
-        time_s = tick * STEP_S
-        if time_s == 8.0:
-            vehicle.lag_s, known = 0.8, estimate.response
-        estimate.update(vehicle.state, sent, near_gate=8.0 <= time_s < 20.0)
-        assert not 8.0 <= time_s < 20.0 or estimate.response == known
-        sent = command_at(time_s)
+@pytest.mark.parametrize("name", VEHICLES)
+def test_the_velocity_that_commands_on_their_way_lead_to_is_predicted(name: str):
+    vehicle = Vehicle(**VEHICLES[name])
+    estimate, sent = learn(vehicle, 8.0), None
+    predicted: deque[tuple[int, tuple[float, float], tuple[float, float]]] = deque()
+    off_m_s, changes_m_s = [], []
+    for tick in range(160, 400):
+        state = vehicle.state
+        if sent is not None:
+            estimate.update(state, sent)
+        x, y = vehicle.plan
+        while predicted and predicted[0][0] <= vehicle.ticks:
+            _, (vx, vy), (was_x, was_y) = predicted.popleft()
+            off_m_s.append(hypot(vx - x, vy - y))
+            changes_m_s.append(hypot(was_x - x, was_y - y))
+        turn = vehicle.turn
+        coming = estimate.predict(state, lambda time_s, yaw=state.yaw, turn=turn: yaw + turn * time_s)
+        predicted.append((vehicle.ticks + round(coming.time_s / TICK_S), coming.velocity_m_s, (x, y)))
+        sent = command_at(tick * TICK_S)
         vehicle.fly(sent)
-    assert estimate.response.level_s > known.level_s
+    middle = len(off_m_s) // 2
+    assert middle > 100
+    assert sorted(off_m_s)[middle] < 0.3 * sorted(changes_m_s)[middle]
 
 
-def test_slow_flight_shows_the_lag_of_a_vehicle_that_is_known_to_be_late():
-    vehicle, estimate, sent = Vehicle(0.35, 0.6), ResponseEstimate(), None
-    for tick in range(round(7.0 / STEP_S)):
-        estimate.update(vehicle.state, sent)
-        usual = command_at(tick * STEP_S)
-        sent = VelocityFluCommand(
-            usual.forward_m_s / 5, usual.left_m_s / 5, usual.up_m_s, usual.yaw_rate_rad_s
-        )
-        vehicle.fly(sent)
-    assert estimate.response.late
-    assert (estimate.response.level_dead_s, estimate.response.level_lag_s) == pytest.approx((0.35, 0.6))
-    assert not estimate.response.turning
+@pytest.mark.parametrize(("dead_s", "lag_s"), [(0.0, 0.0), (0.15, 0.6), (0.35, 0.4), (0.1, 0.8)])
+def test_how_late_commands_are_is_found_within_six_seconds(dead_s: float, lag_s: float):
+    estimate = learn(Vehicle(**{**OWN, "dead_s": dead_s, "lag_s": lag_s}), 6.0)
+    assert estimate.response.known
+    assert estimate.response.late_s == pytest.approx(0.1 + dead_s + lag_s, abs=0.16)
+    assert estimate.loop.turning is (lag_s == 0.0)
 
 
-def test_a_second_lag_is_learnt():
-    response = learn(Vehicle(0.15, 0.6, own_lag_s=0.4), 25.0).response
-    assert response.own_lag_s == 0.4
-    assert response.level_dead_s == pytest.approx(0.15, abs=0.001)
-    assert response.level_lag_s == pytest.approx(0.6, abs=0.001)
+def test_gains_and_drag_are_found():
+    loop = learn(Vehicle(**OWN), 15.0).loop
+    assert loop.command == pytest.approx(0.25, rel=0.25)
+    assert loop.velocity == pytest.approx(0.5, rel=0.2)
+    assert loop.integral == pytest.approx(0.66, rel=0.25)
 
 
-@pytest.mark.parametrize(("drag_per_s", "share"), [(1.0, 0.64), (0.4, 0.82)])
-def test_the_share_that_a_velocity_loop_against_drag_follows_soon_is_learnt(drag_per_s, share):
-    response = learn(PiVehicle(0.25, drag_per_s), 30.0).response
-    assert response.share == pytest.approx(share, abs=0.06)
-    assert response.level_dead_s + response.level_lag_s == pytest.approx(0.25 + share / 1.8, abs=0.1)
+def test_wind_is_a_disturbance_of_the_motion_and_not_of_the_loop():
+    still, windy = learn(Vehicle(**OWN), 15.0), learn(Vehicle(**OWN, wind_m_s2=0.8), 15.0)
+    assert windy.motion.disturbance_m_s2[0] - still.motion.disturbance_m_s2[0] == pytest.approx(0.8, abs=0.3)
+    assert windy.loop.command == pytest.approx(still.loop.command, rel=0.2)
 
 
-@pytest.mark.parametrize("own_lag_s", [0.0, 0.4])
-def test_a_vehicle_that_follows_all_of_a_command_has_no_share(own_lag_s):
-    assert learn(Vehicle(0.35, 0.6, own_lag_s=own_lag_s), 30.0).response.share == 1.0
+def test_a_known_model_is_kept_near_a_gate():
+    vehicle, sent = Vehicle(**OWN), None
+    estimate = learn(vehicle, 8.0)
+    before = estimate.response
+    late = Vehicle(**{**OWN, "dead_s": 0.3})
+    late.ticks = vehicle.ticks
+    for tick in range(100):
+        estimate.update(late.state, sent, near_gate=True)
+        sent = command_at(tick * TICK_S)
+        late.fly(sent)
+    assert estimate.response == before
 
 
-def test_what_a_leg_leaves_in_the_integral_is_predicted():
-    vehicle, sent = PiVehicle(0.35, 1.0), VelocityFluCommand(0.0, 0.8)
-    estimate = learn(vehicle, 25.0)
-    for _ in range(80):
-        vehicle.fly(sent)
-        estimate.update(vehicle.state, sent)
-    for _ in range(20):
-        vehicle.fly(VelocityFluCommand())
-        estimate.update(vehicle.state, VelocityFluCommand())
-    prediction, before = estimate.predict(), vehicle.position
-    left = prediction.slow_m_s[1] * cos(vehicle.yaw) - prediction.slow_m_s[0] * sin(vehicle.yaw)
-    assert left > 0.06
-    assert hypot(*prediction.disturbance_m_s[:2]) < 0.05
-    for _ in range(7):
-        vehicle.fly(VelocityFluCommand())
-    moved = [b - a for a, b in zip(before, vehicle.position, strict=True)]
-    assert prediction.moved_m == pytest.approx(moved, abs=0.01)
-
-
-@pytest.mark.parametrize("own_lag_s", [0.0, 0.4])
-def test_the_motion_by_commands_on_their_way_is_predicted(own_lag_s):
-    vehicle = Vehicle(0.35, 0.6, drift_m_s=0.05, own_lag_s=own_lag_s)
-    estimate = learn(vehicle, 20.0)
-    prediction, before = estimate.predict(), vehicle.position
-    for _ in range(7):
-        vehicle.fly(VelocityFluCommand())
-    moved = [b - a for a, b in zip(before, vehicle.position, strict=True)]
-    missed = hypot(*(p - m for p, m in zip(prediction.moved_m, moved, strict=True)))
-    assert hypot(*moved) > 0.1
-    assert missed < 0.01
-    assert prediction.velocity_m_s == pytest.approx(vehicle.state.velocity_arena_m_s, abs=0.03)
-    assert prediction.disturbance_m_s[2] == pytest.approx(0.05, abs=0.01)
+@pytest.mark.parametrize(("dead_s", "lag_s"), [(0.05, 0.05), (0.25, 0.6), (0.55, 0.3)])
+def test_dead_time_and_lag_of_a_climb_are_found_and_predicted(dead_s: float, lag_s: float):
+    climb, speed, height_m = RateResponse(), 0.0, 0.0
+    waiting = deque([0.0] * round(dead_s / TICK_S))
+    for tick in range(400):
+        command = command_at(tick * TICK_S).up_m_s
+        waiting.append(command)
+        speed += (1.0 - exp(-TICK_S / lag_s)) * (waiting.popleft() - speed)
+        height_m += speed * TICK_S
+        climb.update(command, speed + 0.05, learns=True, chooses=True)
+    assert (climb.dead_s, climb.lag_s) == pytest.approx((dead_s, lag_s))
+    coming, before_m = climb.predict(), height_m
+    while waiting:
+        speed += (1.0 - exp(-TICK_S / lag_s)) * (waiting.popleft() - speed)
+        height_m += (speed + 0.05) * TICK_S
+    assert coming.disturbance == pytest.approx(0.05, abs=0.01)
+    assert coming.moved == pytest.approx(height_m - before_m, abs=0.01)
+    assert coming.rate == pytest.approx(speed + 0.05, abs=0.02)

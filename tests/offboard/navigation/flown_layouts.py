@@ -20,7 +20,6 @@ from offboard.navigation.goals import CONTEST, FlightStyle, Goal, Motion, Obstac
 from offboard.navigation.path import Path
 from offboard.navigation.planner.timing import LEFT_M
 from offboard.navigation.planning import plan
-from offboard.response import ResponseEstimate
 from scenarios.models import COLOURS, Arena, Scenario
 from scenarios.random_scenarios import load_level, random_scenario
 from scenarios.result import RefereeReport
@@ -169,7 +168,7 @@ def fly(
     flight = FlightPlan(layout.scenario, response=response)
     vehicle = LockstepVehicle(flight)
     drone, limits, kept_in_box = vehicle.drone, VelocityLimits(box=flight.box), 0
-    follower, estimate, sent = PathFollower(), ResponseEstimate(), None
+    follower, sent = PathFollower(), None
     asyncio.run(drone.ready())
     asyncio.run(drone.motors_on())
     state = drone.next_state()
@@ -181,17 +180,15 @@ def fly(
     while not (follower.finished and follower.error_m < 0.05):
         now_s = state.time_us * 1e-6
         assert now_s - began_s < 100.0
-        estimate.update(state, sent)
-        answers = follower.response = estimate.response
-        prediction = estimate.predict() if answers.late else None
-        limited = limits.limit(follower.command(path, state, now_s, prediction), state)
+        follower.observe(state, now_s, sent)
+        limited = limits.limit(follower.command(path, state, now_s), state)
         sent, kept_in_box = limited.command, kept_in_box + limited.kept_in_box
         drone.command(sent)
         farthest_m = max(farthest_m, follower.error_m)
         if now_s - planned_s >= replan_s and follower.progress_s < path.duration_s - 1.0:
             goals = goals_left(goals, path, follower.progress_s + follower.lead_s)
             planned_s = now_s
-            style = CONTEST.adapted(answers) if answers.late else CONTEST
+            style = CONTEST.adapted(follower.estimate.response)
             again = layout.plan(follower.reference(), goals, path, style)
             path = path if isinstance(again, Refusal) else follower.continued(again)
         state = drone.next_state()

@@ -1,4 +1,4 @@
-"""The same app flies other airframes than the one whose loops its follower inverts; it is told of none."""
+"""The same app flies any airframe: it is told of none, and learns in flight how each follows commands."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from offboard.drone import DroneState, VelocityFluCommand
 from offboard.navigation.following import PathFollower
 from offboard.navigation.goals import CONTEST, Goal, Motion, Point
 from offboard.navigation.path import Crossing, Path
-from offboard.response import ResponseEstimate
 from tests.offboard.navigation.flown_layouts import Layout, goals_left
 
 AIRFRAMES = [load_airframe(name) for name in ("abejorro", "racer-3in", "x500")]
@@ -46,30 +45,27 @@ def offsets(layout: Layout, airframe: Airframe) -> list[float]:
     asyncio.run(drone.motors_on())
     base = layout.scenario.base
     goals: list[Goal] = [*layout.gates, Point((base.x_m, base.y_m, 1.5))]
-    follower, estimate, state, found = PathFollower(), ResponseEstimate(), drone.next_state(), []
-    ground_m, sent = state.z, VelocityFluCommand(up_m_s=0.5)
+    follower, state, found = PathFollower(), drone.next_state(), []
+    ground_m = state.z
     while state.z < ground_m + TAKE_OFF_M:
-        drone.command(sent)
+        drone.command(VelocityFluCommand(up_m_s=0.5))
         state = drone.next_state()
-        estimate.update(state, sent)
     path = layout.plan(Motion((state.x, state.y, state.z), yaw_rad=state.yaw), goals)
     assert isinstance(path, Path)
     planned_s = began_s = state.time_us * 1e-6
     while not (follower.finished and follower.error_m < 0.1):
         now_s = state.time_us * 1e-6
         assert now_s - began_s < 100.0
-        answers = follower.response = estimate.response
-        sent = follower.command(path, state, now_s, estimate.predict() if answers.late else None)
-        drone.command(sent)
+        drone.command(follower.command(path, state, now_s))
         before, state = state, drone.next_state()
-        estimate.update(state, sent)
         found += [
             offset for crossing in path.crossings if (offset := _across(crossing, before, state)) is not None
         ]
         if now_s - planned_s >= 0.8 and follower.progress_s < path.duration_s - 1.0:
             planned_s, goals = now_s, goals_left(goals, path, follower.progress_s + follower.lead_s)
-            style = CONTEST.adapted(answers) if answers.late else CONTEST
-            again = layout.plan(follower.reference(), goals, path, style)
+            reference = follower.reference()
+            assert reference is not None
+            again = layout.plan(reference, goals, path, CONTEST.adapted(follower.estimate.response))
             path = follower.continued(again) if isinstance(again, Path) else path
     return found
 

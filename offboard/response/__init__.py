@@ -1,0 +1,1 @@
+"""How a vehicle follows commands: identified in flight."""
