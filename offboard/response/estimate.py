@@ -137,13 +137,18 @@ class ResponseEstimate:
         step_s, up_m_s = now_s - last_s, state.velocity_arena_m_s[2]
         turn_rad_s = remainder(state.yaw - yaw, 2 * pi) / step_s
         chooses = not (near_gate and self.response.known)
-        disturbed_m_s2 = hypot(*self.motion.disturbance_m_s2)
         for _ in range(steps):
             self._airborne_steps = 0 if state.landed else self._airborne_steps + 1
             flies = self._airborne_steps > TAKE_OFF_STEPS
             learns = flies and steps == 1 and abs(step_s - STEP_S) < _REGULAR_S
             self._tilt_loop.update(
-                state, level, sent, turn_rad_s, learns=learns, chooses=chooses, disturbed_m_s2=disturbed_m_s2
+                state,
+                level,
+                sent,
+                turn_rad_s,
+                learns=learns,
+                chooses=chooses,
+                disturbed_square=self.motion.disturbed_square,
             )
             self.climb.update(
                 sent.up_m_s, up_m_s, learns=flies, chooses=chooses, cause=_along(self._tilts, level, up_m_s)

@@ -15,6 +15,7 @@ _DISTURBANCE_WANDER = 0.03  # m/s^2 by the root of a second
 _NOISE_M_S2 = 0.35  # of a velocity's change over a step
 _REST_S = 0.7  # time constant of what drag and disturbance leave unexplained, which is taken to go on
 _LONGEST_S = 0.15  # between two velocities that are compared
+_SQUARE_S = 1.0  # time constant of the disturbance's mean square; a gust passes through zero twice a period
 
 
 class LevelMotion:
@@ -26,11 +27,12 @@ class LevelMotion:
         velocity_m_s: at the time of the last state, arena axes.
         drag_per_m: by mass.
         disturbance_m_s2: arena axes.
+        disturbed_square: mean square of the latest disturbances, m^2/s^4.
     """
 
     def __init__(self) -> None:
         self.velocity_m_s: Plan = (0.0, 0.0)
-        self.drag_per_m = _DRAG_PER_M[0]
+        self.drag_per_m, self.disturbed_square = _DRAG_PER_M[0], 0.0
         self._steady_m_s2: Plan = (0.0, 0.0)
         self._rest_m_s2: Plan = (0.0, 0.0)
         variances = (_DRAG_PER_M[1] ** 2, _DISTURBANCE_M_S2**2, _DISTURBANCE_M_S2**2)
@@ -79,6 +81,8 @@ class LevelMotion:
         self._covariance = p
         self.drag_per_m, self._steady_m_s2 = max(x[0], 0.0), (x[1], x[2])
         self._rest_m_s2 = (rests[0], rests[1])
+        dx, dy = self.disturbance_m_s2
+        self.disturbed_square += step_s / _SQUARE_S * (dx * dx + dy * dy - self.disturbed_square)
 
     def acceleration(self, tilts_rad: Plan, yaw_rad: float, velocity_m_s: Plan, up_m_s2: float) -> Plan:
         """In plan, arena axes, m/s^2; upwards it is as given."""

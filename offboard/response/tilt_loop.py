@@ -52,8 +52,8 @@ _STATES = 10  # coefficients, and the trims of both axes
 _PRIOR = np.array((0.05, 0.08, 0.004, 0.3, 0.4, 0.3, 0.5, 0.6, 0.0, 0.0))
 _PRIOR_STD = np.array((0.06, 0.1, 0.003, 0.15, 0.15, 0.35, 0.8, 0.4, 0.05, 0.05))
 _WANDER = np.array((0.001, 0.003, 0.0001, 0.003, 0.003, 0.003, 0.01, 0.005, 0.003, 0.003)) ** 2 * STEP_S
-# By the root of a second, of the tilt against a disturbance: a vehicle may tilt so against gusts by itself.
-_WANDER_OF_DISTURBANCE = 0.3
+# By the root of a second, of the tilt against a disturbance: vehicles may tilt against gusts by themselves.
+_WANDER_OF_DISTURBANCE = 0.5 / GRAVITY_M_S2
 _LAGGED_COST = 8.0  # of a first lag, in log likelihood
 _DEAD_COST = 0.125  # likewise of each quarter step beside the usual dead time
 _USUAL_DEAD = 3
@@ -344,7 +344,7 @@ class TiltLoopEstimate:
         *,
         learns: bool,
         chooses: bool,
-        disturbed_m_s2: float = 0.0,
+        disturbed_square: float = 0.0,
     ) -> None:
         """Add a step.
 
@@ -355,7 +355,7 @@ class TiltLoopEstimate:
             turn_rad_s: rate of the heading since then.
             learns: the motion is in the air, and a step long.
             chooses: another candidate may be chosen.
-            disturbed_m_s2: how much the motion is disturbed in plan.
+            disturbed_square: mean square of what has disturbed the motion in plan, m^2/s^4.
         """
         self._velocities.append(velocity_level_m_s)
         self._turns.append(turn_rad_s)
@@ -380,7 +380,7 @@ class TiltLoopEstimate:
             return
         if not learns:
             return
-        self._learn(middle, disturbed_m_s2)
+        self._learn(middle, disturbed_square)
         self._loop = None
         self.updates += 1
         if chooses and self.updates % _CHOOSE_STEPS == 0:
@@ -454,13 +454,13 @@ class TiltLoopEstimate:
         self._integrals += off
         return rows
 
-    def _learn(self, step: _StepMeans, disturbed_m_s2: float) -> None:
+    def _learn(self, step: _StepMeans, disturbed_square: float) -> None:
         """Update all filters, and the candidates' log likelihoods."""
         x, p = self._x, self._p
         diagonal = p.reshape(len(p), -1)[:, :: _STATES + 1]
         diagonal += _WANDER
         diagonal[:, _COEFFICIENTS:] += np.square(_WANDER_OF_REST * np.array(self._rest_rad))
-        diagonal[:, _COEFFICIENTS:] += STEP_S * (_WANDER_OF_DISTURBANCE * disturbed_m_s2 / GRAVITY_M_S2) ** 2
+        diagonal[:, _COEFFICIENTS:] += _WANDER_OF_DISTURBANCE**2 * STEP_S * disturbed_square
         self._scores *= _MEMORY
         for axis, (row, tilt, rate) in enumerate(
             zip(step.rows, step.tilts_rad, step.rates_rad_s, strict=True)
