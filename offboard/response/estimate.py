@@ -9,7 +9,7 @@ from math import ceil, cos, exp, hypot, pi, remainder, sin
 from framerunner.geometry.vectors import turned
 from offboard.drone import DroneState, VelocityFluCommand
 from offboard.limits import clamped
-from offboard.response.level_motion import LevelMotion
+from offboard.response.level_motion import LevelMotion, in_air
 from offboard.response.rate_response import RateResponse
 from offboard.response.tilt_loop import (
     GRAVITY_M_S2,
@@ -138,7 +138,7 @@ class ResponseEstimate:
         turn_rad_s = remainder(state.yaw - yaw, 2 * pi) / step_s
         chooses = not (near_gate and self.response.known)
         for _ in range(steps):
-            self._airborne_steps = 0 if state.landed else self._airborne_steps + 1
+            self._airborne_steps = self._airborne_steps + 1 if in_air(state) else 0
             flies = self._airborne_steps > TAKE_OFF_STEPS
             learns = flies and steps == 1 and abs(step_s - STEP_S) < _REGULAR_S
             self._tilt_loop.update(

@@ -52,7 +52,7 @@ class LevelMotion:
         """Take in a state; upwards the drone accelerates as given."""
         x, y, self._up_m_s = state.velocity_arena_m_s
         measured_s, last_s = state.time_us * 1e-6 - state.position_age_s, self._measured_s
-        if last_s is not None and 0.0 < (step_s := measured_s - last_s) < _LONGEST_S and not state.landed:
+        if last_s is not None and 0.0 < (step_s := measured_s - last_s) < _LONGEST_S and in_air(state):
             before_x, before_y = self._measured
             tilts = (0.5 * (tilts_rad[0] + self._tilts[0]), 0.5 * (tilts_rad[1] + self._tilts[1]))
             by_x, by_y = _by_tilt(tilts, state.yaw, up_m_s2)
@@ -106,6 +106,11 @@ class LevelMotion:
         forward, left = turned(x, y, -yaw_rad)
         over = GRAVITY_M_S2 + acceleration_m_s2[2]
         return atan2(forward, over), atan2(left, hypot(forward, over))
+
+
+def in_air(state: DroneState) -> bool:
+    """The vehicle flies: it does not stand, and nobody carries it."""
+    return state.armed and not state.landed
 
 
 def _by_tilt(tilts_rad: Plan, yaw_rad: float, up_m_s2: float) -> Plan:

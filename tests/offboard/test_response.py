@@ -32,6 +32,7 @@ class Vehicle:
     dead_s: float = 0.0
     lag_s: float = 0.0  # of commands in arena axes, before the loop
     wind_m_s2: float = 0.0
+    armed: bool = True
     ticks: int = 0
     yaw: float = 0.3
     turn: float = 0.0
@@ -55,7 +56,13 @@ class Vehicle:
         attitude = quaternion_from_euler(roll, forward, self.yaw)
         velocity = (self.plan[0], self.plan[1], self.up)
         return DroneState(
-            self.ticks * 50_000, *self.position, self.yaw, velocity, landed=False, attitude_arena=attitude
+            self.ticks * 50_000,
+            *self.position,
+            self.yaw,
+            velocity,
+            armed=self.armed,
+            landed=False,
+            attitude_arena=attitude,
         )
 
     def fly(self, command: VelocityFluCommand) -> None:
@@ -175,6 +182,13 @@ def test_wind_is_a_disturbance_of_the_motion_and_not_of_the_loop():
     still, windy = learn(Vehicle(**OWN), 15.0), learn(Vehicle(**OWN, wind_m_s2=0.8), 15.0)
     assert windy.motion.disturbance_m_s2[0] - still.motion.disturbance_m_s2[0] == pytest.approx(0.8, abs=0.3)
     assert windy.loop.command == pytest.approx(still.loop.command, rel=0.2)
+
+
+def test_nothing_is_learnt_from_a_drone_that_is_carried_by_hand():
+    carried, untold = learn(Vehicle(**OWN, armed=False), 8.0), ResponseEstimate()
+    assert not carried.response.known
+    assert carried.loop == untold.loop
+    assert carried.motion.drag_per_m == untold.motion.drag_per_m
 
 
 def test_a_known_model_is_kept_near_a_gate():
