@@ -64,8 +64,10 @@ def test_a_drone_that_something_unseen_holds_flies_back_the_way_it_came():
         navigator.observe(state, ())
         before, state = state, flown(state, navigator.fly_to((3.0, 0.0, 1.0)))
         x_m, (_, y_m_s, up_m_s) = min(state.x, wall_x_m), state.velocity_arena_m_s
-        state = replace(state, x=x_m, velocity_arena_m_s=((x_m - before.x) / 0.05, y_m_s, up_m_s))
-        stopped = stopped or x_m == wall_x_m
+        held = x_m == wall_x_m  # also sideways: the drone does not slide along it
+        y_m, y_m_s = (before.y, 0.0) if held else (state.y, y_m_s)
+        state = replace(state, x=x_m, y=y_m, velocity_arena_m_s=((x_m - before.x) / 0.05, y_m_s, up_m_s))
+        stopped = stopped or held
         least_x_m = min(least_x_m, x_m) if stopped else 9.0
     assert stopped
     assert least_x_m < wall_x_m - 0.5
