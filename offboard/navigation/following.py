@@ -182,8 +182,8 @@ class PathFollower:
         """The heading that the drone will have: it follows the path's, or turns."""
         if turn_rad_s is not None:
             return lambda time_s: state.yaw + turn_rad_s * time_s
-        off_rad = state.yaw - path.at(self._clock.in_(0.0)[0]).yaw_rad
-        return lambda time_s: path.at(self._clock.in_(time_s)[0]).yaw_rad + off_rad
+        off_rad = state.yaw - path.yaw_at(self._clock.in_(0.0)[0])
+        return lambda time_s: path.yaw_at(self._clock.in_(time_s)[0]) + off_rad
 
     def _command(
         self,

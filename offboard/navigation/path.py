@@ -69,6 +69,15 @@ class Path:
             start * a[2] + start_rate * a[5] + end * b[2] + end_rate * b[5],
         )
 
+    def yaw_at(self, time_s: float) -> float:
+        """As `at`, only the heading."""
+        a, b, step_s, u = self._segment(time_s)
+        w = 1.0 - u
+        start, start_rate = w * w * (1.0 + 2.0 * u), w * w * u * step_s
+        end, end_rate = u * u * (1.0 + 2.0 * w), -u * u * w * step_s
+        yaw = start * a[9] + start_rate * a[10] + end * b[9] + end_rate * b[10]
+        return remainder(yaw, 2 * pi)
+
     def then(self, following: Path, from_s: float, until_s: float) -> Path:
         """This path from one time until another, and then another path, which starts with its motion then."""
         lead_s = until_s - from_s
